@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.fields.sh import C0
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import Cage
@@ -14,7 +14,7 @@ STEP = 0.05
 REACH, STRENGTH = 0.3, 0.7
 """How far a corner lacks light, and how much of it."""
 
-LIGHT = Ambience((REACH,), (STRENGTH,))
+LIGHT = LightModel((REACH,), (STRENGTH,))
 BOX = Cage.box((0.1, 0.0, 0.3), (0.5, 0.5, 0.6))
 """The box on the floor, z = 0."""
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.cameras.camera import Camera, turntable
-from cagefield.completion.continuous_relighting import bent_voxels
-from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.completion.continuous_relighting import relight_voxels
+from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.patcher import Patcher
-from cagefield.completion.splat_patch import bent_splats
-from cagefield.completion.surfaces.grid_block import block_of
+from cagefield.completion.splat_patch import relight_splats
+from cagefield.completion.surfaces.grid_block import extract_block
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.patch import SplatPatch
 from cagefield.fields.sh import C0
@@ -63,7 +63,7 @@ def seen(field: VoxelField, edits: EditStack) -> NDArray[np.float32]:
 
 def test_what_is_lifted_takes_its_shade_off_the_ground():
     field, truth = room(0.0), seen(room(LIFT), EditStack())
-    light = bent_voxels(field, EditStack(), RAISED, LIGHT)
+    light = relight_voxels(field, EditStack(), RAISED, LIGHT)
     assert light is not None
     bare, lit = (
         db(seen(field, EditStack([RAISED])), truth),
@@ -74,10 +74,10 @@ def test_what_is_lifted_takes_its_shade_off_the_ground():
 
 def test_light_changes_matter_only_right_under_what_is_lifted_and_far_things_keep_theirs():
     field = room(0.0)
-    light = bent_voxels(field, EditStack(), RAISED, LIGHT)
+    light = relight_voxels(field, EditStack(), RAISED, LIGHT)
     assert light is not None
-    block = block_of(field, EditStack([light]), field.bounds)
-    plain = block_of(field, EditStack(), field.bounds)
+    block = extract_block(field, EditStack([light]), field.bounds)
+    plain = extract_block(field, EditStack(), field.bounds)
     where = plain.positions(block.density != plain.density)
     assert np.abs(where[:, :2] - [0.1, 0.0]).max() < 0.4
     assert np.abs(where[:, 2] - FLOOR).max() < 5.0 * plain.spacing[2]
@@ -103,9 +103,9 @@ def test_what_was_hidden_under_what_is_lifted_is_ground():
             np.float32
         ),
     )
-    light = bent_voxels(noisy, EditStack(), RAISED, LIGHT)
+    light = relight_voxels(noisy, EditStack(), RAISED, LIGHT)
     assert light is not None
-    block = block_of(noisy, EditStack([light]), noisy.bounds)
+    block = extract_block(noisy, EditStack([light]), noisy.bounds)
     top = np.zeros(block.shape, bool)
     top.reshape(-1)[
         field.vertices[under & (np.abs(where[:, 2] - FLOOR + 1.0 / VERTICES) < 1.0 / VERTICES)]
@@ -113,9 +113,9 @@ def test_what_was_hidden_under_what_is_lifted_is_ground():
     known = block.colours(top & (block.slot >= 0))
     assert len(known) > 50 and known.std() < 0.05 and abs(known.mean() - 0.6) < 0.1
     assert (block.density[top] > 0.3 * field.density.max()).mean() > 0.9
-    light = bent_voxels(noisy, EditStack(), RAISED.replace(fill="none"), LIGHT)
+    light = relight_voxels(noisy, EditStack(), RAISED.replace(fill="none"), LIGHT)
     assert light is not None
-    block, plain = (block_of(noisy, EditStack(stack), noisy.bounds) for stack in ([light], []))
+    block, plain = (extract_block(noisy, EditStack(stack), noisy.bounds) for stack in ([light], []))
     np.testing.assert_array_equal(block.density, plain.density)
 
 
@@ -138,7 +138,7 @@ def test_fog_between_the_ground_and_what_is_lifted_makes_no_veil():
     left = []
     for fill in ("none", "surroundings"):
         edit = RAISED.replace(fill=fill)
-        light = bent_voxels(foggy, EditStack(), edit, LIGHT)
+        light = relight_voxels(foggy, EditStack(), edit, LIGHT)
         assert light is not None
         left.append(db(seen(foggy, EditStack([light, edit])), truth))
     assert left[1] > left[0] + 3.0
@@ -146,7 +146,7 @@ def test_fog_between_the_ground_and_what_is_lifted_makes_no_veil():
 
 def test_what_stays_where_it_is_has_no_other_light():
     still = Edit(INNER, OUTER, lattice=32).translate((0.0, 0.0, 1e-6))
-    assert bent_voxels(room(0.0), EditStack(), still, LIGHT) is None
+    assert relight_voxels(room(0.0), EditStack(), still, LIGHT) is None
 
 
 @pytest.mark.parametrize("kind", ["voxels", "splats"])
@@ -161,7 +161,7 @@ def test_patchers_put_the_light_before_its_edit(kind: str):
     assert tuple(patcher.patched([edit], moving=True)) == (edit,)
     assert tuple(patcher.patched([edit], bending=False)) == (edit,)
     assert tuple(patcher.patched([edit.replace(relight="none")])) == (edit.replace(relight="none"),)
-    patcher.__dict__["ambience"] = Ambience((), ())
+    patcher.__dict__["ambience"] = LightModel((), ())
     assert tuple(patcher.patched([edit])) == (edit,)
 
 
@@ -176,7 +176,7 @@ def test_the_floor_goes_on_under_splats_that_are_lifted():
     under = on_floor & (away == 0.0)
     for fill in ("none", "surroundings"):
         edit = Edit(inner, outer).translate((0.0, 0.0, 0.4)).replace(fill=fill)
-        light = bent_splats(field, EditStack(), edit, LIGHT)
+        light = relight_splats(field, EditStack(), edit, LIGHT)
         assert isinstance(light.patch, SplatPatch)
         taken = light.patch.takes_away(field.means.astype(np.float64))
         if fill == "none":
@@ -197,7 +197,7 @@ def test_splats_under_what_is_lifted_get_lighter():
     means = field.means + np.where(on_floor, 0.0, 0.15)[:, None].astype(np.float32) * [[0.0, 0.0, 1.0]]
     field = dataclasses.replace(field, means=means)
     inner, outer = Cage.box((0.1, 0.0, 0.45), (0.62, 0.62, 0.66)), Cage.box((0.1, 0.0, 0.85), (1.3, 1.3, 1.5))
-    light = bent_splats(field, EditStack(), Edit(inner, outer).translate((0.0, 0.0, 0.4)), LIGHT)
+    light = relight_splats(field, EditStack(), Edit(inner, outer).translate((0.0, 0.0, 0.4)), LIGHT)
     assert isinstance(light.patch, SplatPatch)
     log = light.patch.light.at(field.means.astype(np.float64))
     away = np.linalg.norm(np.maximum(np.abs(field.means[:, :2] - [0.1, 0.0]) - 0.25, 0.0), axis=1)

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera, turntable
-from cagefield.completion.lighting.directional_light import half_sphere
+from cagefield.completion.lighting.directional_light import hemisphere_directions
 from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
 from cagefield.edits.options import CastShadow
 from cagefield.errors import EditError, EditFileError
@@ -106,7 +106,7 @@ def test_edit_files_say_how_shadows_go_along() -> None:
 
 
 def test_directions_that_are_tried_lie_evenly_over_half_a_sphere() -> None:
-    tried = half_sphere()
+    tried = hemisphere_directions()
     np.testing.assert_allclose(np.linalg.norm(tried, axis=1), 1.0)
     nearest = np.sort(tried @ tried.T, axis=1)[:, -2]
     assert tried[:, 2].min() > 0.0 and np.degrees(np.arccos(nearest)).max() < 20.0

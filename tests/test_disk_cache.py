@@ -14,9 +14,9 @@ from scipy import ndimage
 
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion import patch_cache
-from cagefield.completion.lighting.ambient_occlusion import Ambience
-from cagefield.completion.lighting.diffuse_irradiance import Facing
-from cagefield.completion.lighting.directional_light import Sun
+from cagefield.completion.lighting.ambient_occlusion import LightModel
+from cagefield.completion.lighting.diffuse_irradiance import DiffuseLight
+from cagefield.completion.lighting.directional_light import DirectionalLight
 from cagefield.completion.patch_cache import DiskCache
 from cagefield.completion.patcher import Patcher
 from cagefield.edits import Edit, EditStack
@@ -38,7 +38,7 @@ CAMERAS = turntable((0.0, 0.0, 0.0), 3.0, 4, elevation=0.7, width=48, height=48,
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     # Not by the variable of the user's cache: kernels are kept there too.
     monkeypatch.setattr(patch_cache, "cache_root", lambda: tmp_path)
-    monkeypatch.setattr(patch_cache, "LEAST_SECONDS", -1.0)
+    monkeypatch.setattr(patch_cache, "MIN_CACHED_SECONDS", -1.0)
     return tmp_path / "patches"
 
 
@@ -185,7 +185,7 @@ def test_all_that_results_follow_from_is_told_apart(monkeypatch: pytest.MonkeyPa
 
 
 def test_quick_results_are_not_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(patch_cache, "LEAST_SECONDS", 1e9)
+    monkeypatch.setattr(patch_cache, "MIN_CACHED_SECONDS", 1e9)
     assert made_again((MOVE,)) and made_again((MOVE,))
     assert not folder.exists()
 
@@ -228,7 +228,7 @@ def test_a_full_disk_leaves_nothing_half(folder: Path, monkeypatch: pytest.Monke
 
 
 def test_the_last_room_on_a_disk_stays_free(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(patch_cache, "LEFT_BYTES", 1 << 60)
+    monkeypatch.setattr(patch_cache, "MIN_FREE_BYTES", 1 << 60)
     assert made_again((MOVE,)) and made_again((MOVE,))
     assert list(folder.iterdir()) == []
 
@@ -253,11 +253,11 @@ def test_what_was_not_used_for_longest_goes(folder: Path, monkeypatch: pytest.Mo
     os.utime(old, (now - user_cache.MAX_UNUSED_SECONDS - 60.0,) * 2)
     made_again((BEND,))
     assert not old.exists() and len(list(folder.iterdir())) == 2
-    monkeypatch.setattr(patch_cache, "MOST_BYTES", 4 * size + size // 2)
+    monkeypatch.setattr(patch_cache, "MAX_CACHE_BYTES", 4 * size + size // 2)
     for number in range(3):
         made_again((MOVE, number))
     assert not first.exists() and len(list(folder.iterdir())) == 4
-    monkeypatch.setattr(patch_cache, "MOST_BYTES", 2 * size)
+    monkeypatch.setattr(patch_cache, "MAX_CACHE_BYTES", 2 * size)
     assert made_again(("too large",)) and made_again(("too large",))
 
 
@@ -276,8 +276,10 @@ def test_all_that_results_consist_of_comes_back() -> None:
         np.broadcast_to(np.eye(3), (5, 3, 3)),
         np.ones((5, 3)),
     )
-    facing = Facing((0.1, -0.2, 0.3))
-    ambience = Ambience((0.1, float("inf")), (0.2, 1e-300), facing, Sun((0.0, 0.0, 1.0), 0.3, 0.1, 2.0))
+    facing = DiffuseLight((0.1, -0.2, 0.3))
+    ambience = LightModel(
+        (0.1, float("inf")), (0.2, 1e-300), facing, DirectionalLight((0.0, 0.0, 1.0), 0.3, 0.1, 2.0)
+    )
     on_disk = DiskCache(field, CAMERAS)
     for what, made in (("patch", patch), ("ambience", ambience), ("nothing", None)):
         assert on_disk.get_or_make((what,), lambda made=made: made) is made

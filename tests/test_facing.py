@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera, turntable
-from cagefield.completion.lighting.diffuse_irradiance import Facing, facing_of
+from cagefield.completion.lighting.diffuse_irradiance import DiffuseLight, fit_diffuse_light
 from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.edits import Edit, EditStack
 from cagefield.fields.sh import C0
@@ -91,15 +91,15 @@ def test_pairs_tell_of_light_amid_textures_and_little_or_nothing_of_none() -> No
     texture = chance.normal(0.0, 0.1, 4000) + np.where(
         chance.random(4000) < 0.2, chance.normal(0.0, 1.0, 4000), 0.0
     )
-    light = Facing((0.3, -0.1, 0.4))
+    light = DiffuseLight((0.3, -0.1, 0.4))
     change = light.log_light(second.normals) - light.log_light(first.normals)
-    found = facing_of(first, second, change + texture)
+    found = fit_diffuse_light(first, second, change + texture)
     assert found is not None and np.abs(np.subtract(found.towards, light.towards)).max() < 0.05
-    assert facing_of(first, second, texture) is None
+    assert fit_diffuse_light(first, second, texture) is None
     # What is so on one side alone is no light from far away.
     half = points[:, 0] > 0.5
-    assert facing_of(first, second, np.where(half, 1.0, -1.0) * change + texture) is None
-    assert facing_of(first.take(np.arange(90)), second.take(np.arange(90)), change[:90]) is None
+    assert fit_diffuse_light(first, second, np.where(half, 1.0, -1.0) * change + texture) is None
+    assert fit_diffuse_light(first.take(np.arange(90)), second.take(np.arange(90)), change[:90]) is None
 
 
 def test_what_is_all_dark_or_all_on_one_plane_says_nothing() -> None:
@@ -109,8 +109,8 @@ def test_what_is_all_dark_or_all_on_one_plane_says_nothing() -> None:
     flat = np.ones((2000, 3))
     for points in (chance.random((2000, 3)), flat):
         first, second = (Surfels(points, each) for each in normals)
-        assert facing_of(first, second, np.zeros(2000)) is None
-    assert facing_of(first, second, chance.normal(size=2000)) is None
+        assert fit_diffuse_light(first, second, np.zeros(2000)) is None
+    assert fit_diffuse_light(first, second, chance.normal(size=2000)) is None
 
 
 def test_a_black_scene_can_be_edited() -> None:

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from cagefield.completion.inpainting.support_inpainting import rebuilt
-from cagefield.completion.lighting.light_change import Lighting
-from cagefield.completion.surfaces.footprint import Footprint, footprint_of
-from cagefield.completion.surfaces.grid_block import Block, block_of
+from cagefield.completion.inpainting.support_inpainting import inpaint_support
+from cagefield.completion.lighting.light_change import LightChange
+from cagefield.completion.surfaces.footprint import Footprint, build_footprint
+from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
 from cagefield.completion.surfaces.support_plane import Support
-from cagefield.completion.surfaces.surfels import Surfels, surfels_of
+from cagefield.completion.surfaces.surfels import Surfels, extract_surfels
 from cagefield.edits import EditStack
 from cagefield.fields.voxel_field import VoxelField
 
@@ -21,7 +21,7 @@ TOP, EDGE = 20, 30
 """The highest vertex of a slab, and its last along x."""
 
 
-def slab() -> Block:
+def slab() -> GridBlock:
     """A slab that ends at x = EDGE, red on its top and blue on its side."""
     x, _, z = np.meshgrid(*(np.arange(41),) * 3, indexing="ij")
     solid = (z <= TOP) & (z > TOP - 12) & (x <= EDGE)
@@ -34,10 +34,10 @@ def slab() -> Block:
         np.full(int(solid.sum()), 80.0, np.float32),
         ((rgb - 0.5) / C0).astype(np.float32)[:, None],
     )
-    return block_of(field, EditStack(), np.array([[-1.0] * 3, [1.0] * 3]))
+    return extract_block(field, EditStack(), np.array([[-1.0] * 3, [1.0] * 3]))
 
 
-def near_the_edge(block: Block) -> tuple[Footprint, np.ndarray]:
+def near_the_edge(block: GridBlock) -> tuple[Footprint, np.ndarray]:
     """(a footprint whose hole reaches the edge, what was removed: a box 5 voxels from it)."""
     top = TOP - int(block.low[2])
     support = Support(np.array([0.0, 0.0, top]), np.array([0.0, 0.0, 1.0]), np.eye(3)[:2], np.zeros((0, 3)))
@@ -55,7 +55,7 @@ def near_the_edge(block: Block) -> tuple[Footprint, np.ndarray]:
 def test_the_side_of_an_edge_stays_under_a_fill() -> None:
     block = slab()
     footprint, removed = near_the_edge(block)
-    filled = rebuilt(block, footprint, removed)
+    filled = inpaint_support(block, footprint, removed)
     x, y, z = np.meshgrid(*(np.arange(n) for n in block.shape), indexing="ij")
     x, z = x + block.low[0], z + block.low[2]
     side = (x == EDGE) & (z < TOP - 1) & (z >= TOP - 4) & (np.abs(y - block.shape[1] // 2) < 6)
@@ -68,9 +68,9 @@ def test_the_side_of_an_edge_stays_under_a_fill() -> None:
 
 def test_light_on_a_top_does_not_reach_around_its_edge() -> None:
     block = slab()
-    surface = surfels_of(block).thinned(2.0 * VOXEL)
+    surface = extract_surfels(block).thinned(2.0 * VOXEL)
     up = surface.normals[:, 2] > 0.8
-    light = Lighting.of(block, surface, np.where(up, 1.0, 0.0), 2.0 * VOXEL)
+    light = LightChange.of(block, surface, np.where(up, 1.0, 0.0), 2.0 * VOXEL)
     dense = light.dense(block)
     x, y, z = np.meshgrid(*(np.arange(n) for n in block.shape), indexing="ij")
     x, z = x + block.low[0], z + block.low[2]
@@ -91,7 +91,7 @@ def test_the_sides_of_a_support_are_not_among_what_is_unsure() -> None:
     part[middle[0] - 3 : middle[0] + 3, middle[1] - 3 : middle[1] + 3, int(support.point[2]) + 1 :] = True
     aside = members[(members[:, 0] < 12) & (members[:, 1] < 12)]
     level, steep = (Surfels(aside, np.tile(n, (len(aside), 1))) for n in ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]))
-    filled, kept = (footprint_of(support, part, np.zeros((0, 3)), unsure) for unsure in (level, steep))
+    filled, kept = (build_footprint(support, part, np.zeros((0, 3)), unsure) for unsure in (level, steep))
     assert filled is not None and kept is not None
     assert filled.hole.sum() > kept.hole.sum() + 50
 
@@ -107,6 +107,6 @@ def test_stripes_go_on_under_what_was_removed() -> None:
     footprint = replace(footprint, hole=middle[..., 0], around=footprint.surfaced & ~middle[..., 0])
     blank = striped.with_colours(shown & middle, np.full((int((shown & middle).sum()), 3), 0.9))
     above = z + block.low[2] - TOP
-    filled = rebuilt(blank, footprint, middle & (above > 0) & (above < 6))
+    filled = inpaint_support(blank, footprint, middle & (above > 0) & (above < 6))
     at = middle & (z + block.low[2] == TOP)
     assert np.abs(filled.colours(at)[:, 0] - wave[at]).mean() < 0.06

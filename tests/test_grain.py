@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.completion.inpainting.coherence_transport import grain_of, streamed
-from cagefield.completion.inpainting.support_inpainting import membrane
+from cagefield.completion.inpainting.coherence_transport import estimate_orientation, transport_colors
+from cagefield.completion.inpainting.support_inpainting import solve_membrane
 from cagefield.typing import Array, Mask
 
 SIZE = 64
@@ -28,9 +28,9 @@ def lines(angle: float, bend: float = 0.0) -> Array:
 def filled(values: Array, gap: Mask, given: Mask) -> tuple[Array, Array]:
     """(the membrane, the same with the grain) over the gap."""
     table = values.reshape(-1, 1)
-    grain = grain_of(values, given, lambda known, rows: membrane(gap, known, rows))
-    rows, share = streamed(gap, given, table, grain)
-    spanned = membrane(gap, given, table)[gap.reshape(-1), 0]
+    grain = estimate_orientation(values, given, lambda known, rows: solve_membrane(gap, known, rows))
+    rows, share = transport_colors(gap, given, table, grain)
+    spanned = solve_membrane(gap, given, table)[gap.reshape(-1), 0]
     return spanned, spanned + share * (rows[:, 0] - spanned)
 
 
@@ -51,7 +51,7 @@ def test_bent_stripes_are_followed() -> None:
 
 def test_noise_has_no_grain() -> None:
     values, gap = np.random.default_rng(0).normal(size=(SIZE, SIZE)), hole()
-    grain = grain_of(values, ~gap, lambda known, rows: membrane(gap, known, rows))
+    grain = estimate_orientation(values, ~gap, lambda known, rows: solve_membrane(gap, known, rows))
     assert np.median(grain.alike[gap]) < 0.1
     spanned, grained = filled(values, gap, ~gap)
     assert (grained - values[gap]).std() < 1.1 * (spanned - values[gap]).std()
@@ -61,14 +61,16 @@ def test_lines_that_do_not_come_out_again_bring_nothing() -> None:
     """At the edge of what is known, lines end in nothing: the membrane stays."""
     values, gap = lines(0.0), np.zeros((SIZE, SIZE), bool)
     gap[40:] = True
-    grain = grain_of(values, ~gap, lambda known, rows: membrane(gap, known, rows))
+    grain = estimate_orientation(values, ~gap, lambda known, rows: solve_membrane(gap, known, rows))
     assert np.abs(grain.along[20:36, 20:36, 0]).min() > 0.95  # they run into the gap
-    rows, share = streamed(gap, ~gap, values.reshape(-1, 1), grain)
+    rows, share = transport_colors(gap, ~gap, values.reshape(-1, 1), grain)
     assert (share == 0.0).all() and (rows == 0.0).all()
 
 
 def test_nothing_known_has_no_grain() -> None:
     nothing, gap = np.zeros((SIZE, SIZE), bool), hole()
-    grain = grain_of(np.zeros((SIZE, SIZE)), nothing, lambda known, rows: membrane(gap, known, rows))
+    grain = estimate_orientation(
+        np.zeros((SIZE, SIZE)), nothing, lambda known, rows: solve_membrane(gap, known, rows)
+    )
     assert not grain.alike.any()
-    assert not streamed(gap, nothing, np.zeros((SIZE * SIZE, 3)), grain)[1].any()
+    assert not transport_colors(gap, nothing, np.zeros((SIZE * SIZE, 3)), grain)[1].any()

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from cagefield.completion.pasting.paste_composite import joined
-from cagefield.completion.pasting.paste_content import SourceContent, pasted
+from cagefield.completion.pasting.paste_composite import composite_paste
+from cagefield.completion.pasting.paste_content import SourceContent, extract_content
 from cagefield.edits import Edit, EditStack
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.fields.voxel_layers import ALIGNED
@@ -80,10 +80,10 @@ def test_the_page_draws_pastes_as_the_kernel_does(page: FieldPage, contracted: b
     """Another scene's lumps, twice: turned and scaled, put over the field's own."""
     field, other, seen = lumps(1, contracted), lumps(2, False, seed=9), camera(contracted)
     cage = Cage.box((0.1, 0.0, 0.0), 0.9)
-    shown = pasted(SourceContent(other, EditStack()), cage, field)
+    shown = extract_content(SourceContent(other, EditStack()), cage, field)
     edit = Edit.paste("other", cage).scale(0.6).rotate((0.2, 0.0, 0.7)).replace(pasted=shown)
     first = edit.translate((0.1, -0.6, 0.1) if contracted else (-0.5, 0.3, 0.2))
-    first = first.replace(pasted=joined(field, EditStack(), first))
+    first = first.replace(pasted=composite_paste(field, EditStack(), first))
     assert first.pasted is not shown
     renderer = Renderer(field, EditStack([TURNED, first, edit.translate((0.6, -0.2, 0.3))]))
     page.edit(None)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cagefield.cameras.camera import Camera, turntable
-from cagefield.completion.splat_patch import splat_patch_of
+from cagefield.completion.splat_patch import build_splat_patch
 from cagefield.edits import Edit, EditStack
 from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats.splat_files import read_splats
@@ -284,7 +284,7 @@ def test_the_page_draws_edits_as_the_rasteriser_does(
 
 def test_the_page_fills_and_relights_as_the_rasteriser_does(page: FieldPage) -> None:
     field, edit = room(True), Edit.delete(cage())
-    edits = EditStack([edit.replace(patch=splat_patch_of(field, EditStack(), edit, LIGHT))])
+    edits = EditStack([edit.replace(patch=build_splat_patch(field, EditStack(), edit, LIGHT))])
     ours, bare = (
         SplatRenderer(field, each).render(camera(), normals=True) for each in (edits, EditStack([edit]))
     )

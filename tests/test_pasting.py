@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion.pasting.paste_content import content_box
-from cagefield.completion.surfaces.grid_block import block_of
+from cagefield.completion.surfaces.grid_block import extract_block
 from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
 from cagefield.edits.operations import Rotate, Scale
 from cagefield.errors import EditError, EditFileError, SceneError
@@ -142,7 +142,7 @@ def test_vertices_are_copied_as_they_are(folder: Path) -> None:
     small = Edit.paste("../thing", Cage.box((0.1, 0.1, 0.0), 0.8)).translate((0.6, 0.0, 0.0))
     (edit,) = scene.with_edits(EditStack([small.replace(relight="none")])).patched_edits
     assert edit.part is not None and edit.part.resolution == scene.field.resolution
-    block = block_of(other, EditStack(), np.array([[-0.2, -0.2, -0.3], [0.4, 0.4, 0.3]]))
+    block = extract_block(other, EditStack(), np.array([[-0.2, -0.2, -0.3], [0.4, 0.4, 0.3]]))
     every = np.ones(block.shape, bool)
     at = block.positions(every) + np.array([0.6, 0.0, 0.0])
     mapped = EditStack([edit]).to_canonical(at)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cagefield.cameras.camera import Camera
-from cagefield.completion.splat_patch import splat_patch_of
+from cagefield.completion.splat_patch import build_splat_patch
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.operations import Rotate
 from cagefield.errors import EditError
@@ -139,7 +139,7 @@ def test_surroundings_get_a_shadow(tmp_path: Path) -> None:
     edit = Edit.paste("../box", cage()).translate((-0.5, 0.25, 0.0))
     (ready,) = bare.with_edits(EditStack([edit.replace(relight="none")])).patched_edits
     truth = seen(room(True, by=(-0.5, 0.25)), EditStack())
-    shaded = ready.replace(patch=splat_patch_of(bare.field, EditStack(), ready, LIGHT))  # type: ignore[arg-type]
+    shaded = ready.replace(patch=build_splat_patch(bare.field, EditStack(), ready, LIGHT))  # type: ignore[arg-type]
     plain, both = (psnr(seen(bare.field, EditStack([e])), truth) for e in (ready, shaded))  # type: ignore[arg-type]
     assert both > plain + 3.0
 
@@ -149,7 +149,7 @@ def test_what_an_earlier_edit_was_filled_with_stays_beside_a_paste(tmp_path: Pat
     Scene(room(True)).save(tmp_path / "box")
     scene = Scene(room(True), folder=tmp_path / "floor")
     gone = Edit.delete(cage())
-    gone = gone.replace(patch=splat_patch_of(scene.field, EditStack(), gone, LIGHT))  # type: ignore[arg-type]
+    gone = gone.replace(patch=build_splat_patch(scene.field, EditStack(), gone, LIGHT))  # type: ignore[arg-type]
     far = Edit.paste("../box", cage()).replace(relight="none").translate((9.0, 0.0, 0.0))
     (far,) = scene.with_edits(EditStack([far])).patched_edits
     alone, both = (seen(scene.field, EditStack(edits)) for edits in ([gone], [gone, far]))  # type: ignore[arg-type]

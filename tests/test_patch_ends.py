@@ -9,13 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera
-from cagefield.completion.continuous_relighting import bent_voxels
-from cagefield.completion.edit_context import Work
-from cagefield.completion.inpainting.support_inpainting import rebuilt
-from cagefield.completion.lighting.ambient_occlusion import Ambience
-from cagefield.completion.lighting.shadow_strength import STRONG, WEAK, strength_of
+from cagefield.completion.continuous_relighting import relight_voxels
+from cagefield.completion.edit_context import EditContext
+from cagefield.completion.inpainting.support_inpainting import inpaint_support
+from cagefield.completion.lighting.ambient_occlusion import LightModel
+from cagefield.completion.lighting.shadow_strength import MAX_STRENGTH, MIN_STRENGTH, fit_shadow_strength
 from cagefield.completion.surfaces.footprint import Footprint
-from cagefield.completion.surfaces.grid_block import block_of
+from cagefield.completion.surfaces.grid_block import extract_block
 from cagefield.completion.surfaces.support_plane import Support
 from cagefield.edits import Edit, EditStack
 from cagefield.fields.voxel_field import VoxelField
@@ -61,13 +61,15 @@ def test_the_strength_of_a_shade_is_measured_around_it() -> None:
 
     def strength(times: float, seen: object = sight) -> float:
         weaker = dataclasses.replace(ambience, weights=tuple(times * w for w in ambience.weights))
-        work = Work.of(field, EditStack(), Edit.delete(cage()), weaker, False, True, None, seen)
+        work = EditContext.of(field, EditStack(), Edit.delete(cage()), weaker, False, True, None, seen)
         support = work.support()
         assert support is not None
-        return strength_of(work.gone, work.others, work.before, work.edit.inner, work.sight, weaker, support)
+        return fit_shadow_strength(
+            work.gone, work.others, work.before, work.edit.inner, work.sight, weaker, support
+        )
 
     right = strength(1.0)
-    assert WEAK < right < STRONG and strength(0.6) > right + 0.15
+    assert MIN_STRENGTH < right < MAX_STRENGTH and strength(0.6) > right + 0.15
     assert strength(1.0, None) == 1.0
     bright = dataclasses.replace(sight, bright=np.zeros_like(sight.bright))
     assert strength(1.0, bright) < 0.75  # no shade is seen there
@@ -79,7 +81,7 @@ def test_a_rim_in_deep_shade_does_not_colour_what_is_filled() -> None:
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
     away = np.hypot(x, y)
     rgb = np.where((away < 0.35)[..., None], 0.15, 0.6) * np.ones((*x.shape, 3))
-    block = block_of(solid_field(z < 0.01, rgb), EditStack(), np.array([[-1.0] * 3, [1.0] * 3]))
+    block = extract_block(solid_field(z < 0.01, rgb), EditStack(), np.array([[-1.0] * 3, [1.0] * 3]))
     far = np.hypot(*(np.stack(np.meshgrid(*[np.arange(-20, 21)] * 2, indexing="ij")))) / 20.0
     hole = far < 0.24
     support = Support(
@@ -93,7 +95,7 @@ def test_a_rim_in_deep_shade_does_not_colour_what_is_filled() -> None:
     none = np.zeros(block.shape, bool)
 
     def across(which: Footprint) -> NDArray[np.float64]:
-        return rebuilt(block, which, none | (away < 0.2) & (z > 0.0)).colours(at)[:, 0]
+        return inpaint_support(block, which, none | (away < 0.2) & (z > 0.0)).colours(at)[:, 0]
 
     dark, bright = across(footprint), across(lit)
     assert dark[18:23].max() < 0.2 and bright[18:23].min() > 0.5
@@ -110,11 +112,11 @@ def test_what_a_lifted_part_hid_takes_the_colours_around() -> None:
     under = (np.abs(x - 0.1) < 0.2) & (np.abs(y) < 0.2) & (z < -0.35)
     rows[under] += chance.uniform(-0.5, 0.5, (int(under.sum()), 1, 3)).astype(np.float32)
     field = dataclasses.replace(field, sh=rows)
-    strong = Ambience(LIGHT.reaches, tuple(1.3 * w for w in LIGHT.weights))
+    strong = LightModel(LIGHT.reaches, tuple(1.3 * w for w in LIGHT.weights))
     edit = Edit(INNER, OUTER, lattice=32).translate((0.0, 0.0, 0.35))
-    light = bent_voxels(field, EditStack(), edit, strong)
+    light = relight_voxels(field, EditStack(), edit, strong)
     assert light is not None
-    block = block_of(field, EditStack([light]), field.bounds)
+    block = extract_block(field, EditStack([light]), field.bounds)
     points = block.positions(np.ones(block.shape, bool)).reshape(*block.shape, 3)
     deep = (np.abs(points[..., :2] - [0.1, 0.0]) < 0.12).all(axis=-1) & (np.abs(points[..., 2] + 0.42) < 0.02)
     colours = block.colours(deep & (block.slot >= 0))

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.cameras.camera import Camera, turntable
-from cagefield.completion.discrete_patch import patch_of
-from cagefield.completion.inpainting.support_inpainting import membrane
-from cagefield.completion.lighting.ambient_occlusion import Ambience
-from cagefield.completion.patcher import wants_patch
+from cagefield.completion.discrete_patch import build_patch
+from cagefield.completion.inpainting.support_inpainting import solve_membrane
+from cagefield.completion.lighting.ambient_occlusion import LightModel
+from cagefield.completion.patcher import needs_patch
 from cagefield.completion.surfaces.footprint import Footprint
-from cagefield.completion.surfaces.grid_block import block_of, interpolated
+from cagefield.completion.surfaces.grid_block import extract_block, interpolate_field
 from cagefield.completion.surfaces.support_plane import Support
-from cagefield.completion.surfaces.visibility import sight_of
+from cagefield.completion.surfaces.visibility import render_visibility
 from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
 from cagefield.edits.options import Clone
 from cagefield.edits.patch import Patch
@@ -98,7 +98,7 @@ def test_a_box_leaves_no_trace(scenes: tuple[Scene, Scene]) -> None:
 def test_what_cameras_see_of_a_floor() -> None:
     """Beside a box, not within it nor beneath the floor; of the hole of a footprint that is left out."""
     field = room(True)
-    sight = sight_of(lambda camera: Renderer(field).render(camera), cameras(), field.bounds)
+    sight = render_visibility(lambda camera: Renderer(field).render(camera), cameras(), field.bounds)
     asked = np.array([[0.1, 0.4, FLOOR], [0.1, 0.0, FLOOR - 0.15], [0.1, 0.0, 0.0]])
     beside, beneath, within = sight.views_of(asked, 0.05)
     assert beside >= 4 and beneath == within == 0
@@ -168,12 +168,12 @@ def test_shadows_go_along(scenes: tuple[Scene, Scene]) -> None:
 def test_switched_off_nothing_is_patched(scenes: tuple[Scene, Scene]) -> None:
     scene, _ = scenes
     edit = dataclasses.replace(Edit.delete(cage()), fill="none", relight="none")
-    assert not wants_patch(edit) and scene.with_edits(EditStack([edit])).patched_edits[0].patch is None
+    assert not needs_patch(edit) and scene.with_edits(EditStack([edit])).patched_edits[0].patch is None
     plain = Renderer(scene.field, EditStack([edit])).render(cameras()[0])  # type: ignore[arg-type]
     own = scene.with_edits(EditStack([edit])).render(cameras()[0])
     assert plain is not None and np.array_equal(plain.rgb, own.rgb)
     continuous = Edit(cage(), cage().grown(0.1)).translate((0.05, 0.0, 0.0))
-    assert not wants_patch(continuous) and not wants_patch(Edit.delete(cage()).replace(enabled=False))
+    assert not needs_patch(continuous) and not needs_patch(Edit.delete(cage()).replace(enabled=False))
 
 
 def test_patches_are_kept_while_a_cage_is_dragged(scenes: tuple[Scene, Scene]) -> None:
@@ -189,7 +189,7 @@ def test_patches_are_kept_while_a_cage_is_dragged(scenes: tuple[Scene, Scene]) -
 
 def other(field: VoxelField, box: NDArray[np.float64], rgb: tuple[float, float, float]) -> VoxelField:
     """A layer of one colour in a box, as dense as its height says."""
-    block = block_of(field, EditStack(), box)
+    block = extract_block(field, EditStack(), box)
     every = np.ones(block.shape, bool)
     heights = block.positions(every)[:, 2]
     full = block.with_density(every, (20.0 * (heights > 0.0)).astype(np.float32))
@@ -262,16 +262,16 @@ def test_layers_lie_behind_the_field_and_apart() -> None:
 def test_a_patch_over_an_earlier_edit_shows_what_that_made() -> None:
     field = room(True)
     earlier = Edit(cage(), adjustment="discrete").translate((-0.7, 0.0, 0.0)).rotate((0.0, 0.0, 0.5))
-    block = block_of(field, EditStack([earlier]), np.array([[-0.9, -0.4, -0.7], [0.5, 0.4, 0.3]]))
+    block = extract_block(field, EditStack([earlier]), np.array([[-0.9, -0.4, -0.7], [0.5, 0.4, 0.3]]))
     mapped = EditStack([earlier]).to_canonical(block.positions(np.ones(block.shape, bool)))
-    raw, _ = interpolated(field, mapped.points)
+    raw, _ = interpolate_field(field, mapped.points)
     expected = np.where(mapped.layer < 0, 0.0, np.maximum(raw, 0.0)).reshape(block.shape)
     np.testing.assert_allclose(np.maximum(block.density, 0.0), expected, atol=1e-4 * expected.max())
     # The box that was moved is taken away again, where it is now.
     again = Edit.delete(earlier.deformed)
-    patch = patch_of(field, EditStack([earlier]), again, None)
+    patch = build_patch(field, EditStack([earlier]), again, None)
     at = earlier.deformed.center[None]
-    assert interpolated(patch.under, at)[0][0] <= 0.0
+    assert interpolate_field(patch.under, at)[0][0] <= 0.0
 
 
 def test_membranes_are_harmonic() -> None:
@@ -279,7 +279,7 @@ def test_membranes_are_harmonic() -> None:
     hole = (u > 4) & (u < 15) & (v > 3) & (v < 11)
     values = np.stack([2.0 * u - v + 3.0, u * v], axis=-1).reshape(-1, 2)  # both harmonic on a grid
     table = np.where(hole.reshape(-1, 1), 0.0, values)
-    np.testing.assert_allclose(membrane(hole, ~hole, table), values, atol=1e-2)
+    np.testing.assert_allclose(solve_membrane(hole, ~hole, table), values, atol=1e-2)
 
 
 def test_a_table_ends_at_its_edge(scenes: tuple[Scene, Scene]) -> None:
@@ -338,8 +338,8 @@ def test_options_are_read_and_written(tmp_path: Path) -> None:
 
 
 def test_openness_needs_weights() -> None:
-    assert not Ambience((), ()).shows and Ambience((), ()).reach == 0.0
-    both = Ambience((0.1, 0.2), (0.5, 0.5))
+    assert not LightModel((), ()).shows and LightModel((), ()).reach == 0.0
+    both = LightModel((0.1, 0.2), (0.5, 0.5))
     np.testing.assert_allclose(np.exp(both.log_openness(np.array([[0.0, 0.0], [1.0, 0.0]]))), [1.0, 0.5])
 
 

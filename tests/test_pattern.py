@@ -7,8 +7,8 @@ import pytest
 from scipy import ndimage
 
 from cagefield.completion.inpainting import exemplar_inpainting
-from cagefield.completion.inpainting.exemplar_inpainting import patterned
-from cagefield.completion.inpainting.support_inpainting import membrane
+from cagefield.completion.inpainting.exemplar_inpainting import inpaint_texture
+from cagefield.completion.inpainting.support_inpainting import solve_membrane
 from cagefield.typing import Array, Mask
 
 SIZE = 96
@@ -34,14 +34,14 @@ def tiles() -> Array:
 
 
 def spanned(colours: Array, gap: Mask) -> Array:
-    return membrane(gap, ~gap, colours.reshape(-1, 3)).reshape(colours.shape)
+    return solve_membrane(gap, ~gap, colours.reshape(-1, 3)).reshape(colours.shape)
 
 
 def filled(colours: Array, gap: Mask) -> tuple[Array, Array]:
     """(the membrane, the same with the pattern)."""
     hidden = np.where(gap[..., None], 9.0, colours)
     start = spanned(hidden, gap)
-    return start, patterned(gap, ~gap, hidden, start, np.zeros(gap.shape))
+    return start, inpaint_texture(gap, ~gap, hidden, start, np.zeros(gap.shape))
 
 
 def test_what_repeats_goes_on_as_it_is() -> None:
@@ -54,7 +54,7 @@ def test_what_repeats_goes_on_as_it_is() -> None:
 def test_a_large_hole_goes_by_patches_farther_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     colours, gap = tiles(), hole()
     start, found = filled(colours, gap)
-    monkeypatch.setattr(exemplar_inpainting, "MOST", 100)
+    monkeypatch.setattr(exemplar_inpainting, "MAX_DENSE_PATCHES", 100)
     wrong, less, left = (
         np.abs(each - colours)[gap].mean() for each in (found, filled(colours, gap)[1], start)
     )
@@ -95,10 +95,12 @@ def test_where_little_is_known_all_stays_as_it_begins() -> None:
     start, found = filled(colours, gap)
     np.testing.assert_array_equal(found[gap], start[gap])
     nothing = np.zeros((SIZE, SIZE), bool)
-    np.testing.assert_array_equal(patterned(nothing, ~nothing, colours, colours, nothing * 1.0), colours)
+    np.testing.assert_array_equal(
+        inpaint_texture(nothing, ~nothing, colours, colours, nothing * 1.0), colours
+    )
     start = spanned(colours[:5, :7], hole()[:5, :7])
     np.testing.assert_array_equal(
-        patterned(gap[:5, :7], ~gap[:5, :7], colours[:5, :7], start, np.zeros((5, 7))), start
+        inpaint_texture(gap[:5, :7], ~gap[:5, :7], colours[:5, :7], start, np.zeros((5, 7))), start
     )
 
 
@@ -108,5 +110,7 @@ def test_the_pattern_fits_to_what_is_half_known(seed: int) -> None:
     ring = gap & ~hole(9.0)
     hidden = np.where((gap & ~ring)[..., None], 9.0, colours)
     start = spanned(np.where(gap[..., None], 9.0, colours), gap)
-    alone, fitted = (patterned(gap, ~gap, hidden, start, firm * ring, seed=seed)[ring] for firm in (0.0, 0.8))
+    alone, fitted = (
+        inpaint_texture(gap, ~gap, hidden, start, firm * ring, seed=seed)[ring] for firm in (0.0, 0.8)
+    )
     assert np.abs(fitted - colours[ring]).mean() < 0.6 * np.abs(alone - colours[ring]).mean()

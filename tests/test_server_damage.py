@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cagefield.cameras.camera import Camera
-from cagefield.completion.lighting.ambient_occlusion import Ambience, reaches_of
+from cagefield.completion.lighting.ambient_occlusion import LightModel, occlusion_radii
 from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
 from cagefield.geometry.cage import Cage
@@ -292,7 +292,7 @@ def shaded() -> Scene:
     """A ball of small voxels, whose colours are said to follow its openness."""
     field = ball_field(resolution=65)
     scene = Scene(field)
-    scene.patcher.__dict__["ambience"] = Ambience(reaches_of(field), (0.1, 0.2, 0.2, 0.2, 0.2))
+    scene.patcher.__dict__["ambience"] = LightModel(occlusion_radii(field), (0.1, 0.2, 0.2, 0.2, 0.2))
     return scene
 
 

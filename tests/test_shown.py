@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.completion.surfaces.grid_block import Block, block_of
-from cagefield.completion.surfaces.surface_color import FROM, TO, shown, steadied
-from cagefield.completion.surfaces.surfels import surfels_of
+from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
+from cagefield.completion.surfaces.surface_color import (
+    FULLY_DENOISED_LOG_GAIN,
+    MIN_DENOISED_LOG_GAIN,
+    colors_along_normals,
+    denoise_colors,
+)
+from cagefield.completion.surfaces.surfels import extract_surfels
 from cagefield.edits import EditStack
 from cagefield.fields.sh import C0
 from cagefield.fields.voxel_field import VoxelField
@@ -14,7 +19,7 @@ from cagefield.fields.voxel_field import VoxelField
 VERTICES, TOP = 24, 12
 
 
-def ground(seed: int = 0) -> Block:
+def ground(seed: int = 0) -> GridBlock:
     """Foggy ground up to height TOP, grey 0.2 on the whole, each vertex with noise of its own."""
     shape = (VERTICES,) * 3
     z = np.broadcast_to(np.arange(VERTICES), shape)
@@ -29,10 +34,10 @@ def ground(seed: int = 0) -> Block:
         np.where(solid, 0.7 / voxel, 0.0).astype(np.float32),
         ((colour - 0.5) / C0).astype(np.float32),
     )
-    return block_of(field, EditStack(), field.bounds)
+    return extract_block(field, EditStack(), field.bounds)
 
 
-def inner(block: Block) -> np.ndarray:
+def inner(block: GridBlock) -> np.ndarray:
     """[X,Y,Z]: the ground's topmost vertices, away from the block's faces."""
     where = np.zeros(block.shape, bool)
     where[4:-4, 4:-4, TOP - 1 : TOP + 1] = True
@@ -41,9 +46,9 @@ def inner(block: Block) -> np.ndarray:
 
 def test_what_shows_is_the_mean_of_what_a_ray_meets():
     block = ground()
-    surface = surfels_of(block)
+    surface = extract_surfels(block)
     facing = surface.normals[:, 2] > 0.9
-    colours, opacity = shown(block, surface.take(facing))
+    colours, opacity = colors_along_normals(block, surface.take(facing))
     mean = 0.5 + C0 * colours[:, 0]
     assert opacity.min() > 0.9
     assert mean.std() < 0.7 * 0.15 and abs(float(mean.mean()) - 0.2) < 0.02
@@ -53,7 +58,9 @@ def test_light_that_grows_brings_no_noise_out():
     block = ground()
     where = inner(block)
     before = block.colours(where)
-    after = steadied(block, where, np.full(int(where.sum()), TO + 0.1)).colours(where)
+    after = denoise_colors(block, where, np.full(int(where.sum()), FULLY_DENOISED_LOG_GAIN + 0.1)).colours(
+        where
+    )
     assert after.std() < 0.6 * before.std()
     assert abs(after.mean() - before.mean()) < 0.02
 
@@ -61,12 +68,12 @@ def test_light_that_grows_brings_no_noise_out():
 def test_light_that_stays_or_fades_changes_no_colour():
     block = ground()
     where = inner(block)
-    for log in (-1.0, 0.0, FROM):
-        assert steadied(block, where, np.full(int(where.sum()), log)) is block
+    for log in (-1.0, 0.0, MIN_DENOISED_LOG_GAIN):
+        assert denoise_colors(block, where, np.full(int(where.sum()), log)) is block
 
 
 def test_blocks_without_surfaces_stay():
     block = ground()
     empty = block.with_density(np.ones(block.shape, bool), np.zeros(block.density.size, np.float32))
     where = empty.slot >= 0
-    assert steadied(empty, where, np.ones(int(where.sum()))) is empty
+    assert denoise_colors(empty, where, np.ones(int(where.sum()))) is empty

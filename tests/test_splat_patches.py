@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion.continuous_relighting import light_edit
-from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.patcher import Patcher
-from cagefield.completion.splat_patch import splat_patch_of
-from cagefield.completion.surfaces.splat_voxelization import voxelised
+from cagefield.completion.splat_patch import build_splat_patch
+from cagefield.completion.surfaces.splat_voxelization import voxelize_splats
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.options import Clone
 from cagefield.edits.patch import NewLight, SplatPatch
@@ -46,9 +46,9 @@ def seen(field: SplatField, edits: EditStack, scale: float = 1.0) -> NDArray[np.
     return np.stack([renderer.render(camera, background="white").rgb for camera in cameras(scale)])
 
 
-def patched(field: SplatField, edit: Edit, light: Ambience | None = LIGHT) -> EditStack:
+def patched(field: SplatField, edit: Edit, light: LightModel | None = LIGHT) -> EditStack:
     """The edit with its patch."""
-    return EditStack([edit.replace(patch=splat_patch_of(field, EditStack(), edit, light))])
+    return EditStack([edit.replace(patch=build_splat_patch(field, EditStack(), edit, light))])
 
 
 def test_a_deleted_box_leaves_a_floor_without_a_hole_or_a_shadow():
@@ -65,7 +65,7 @@ def test_units_make_no_difference(scale):
     field = room(True, scale)
     size = cage().aabb[1] - cage().aabb[0]
     edit = Edit.delete(Cage.box(scale * cage().aabb.mean(axis=0), scale * size))
-    light = Ambience((scale * REACH,), (STRENGTH,))
+    light = LightModel((scale * REACH,), (STRENGTH,))
     there = seen(field, patched(field, edit, light), scale)
     usual = room(True)
     # The box's lowest row lies on the cage's floor: rounding decides on which side, which leaves a thin line.
@@ -79,7 +79,7 @@ def test_fill_is_of_splats_of_its_colour_that_look_the_same_all_around():
     sh[:, :1] = field.sh
     sh[::2, 1:] = 0.8
     field = dataclasses.replace(field, sh=sh)
-    patch = splat_patch_of(field, EditStack(), Edit.delete(cage()), LIGHT)
+    patch = build_splat_patch(field, EditStack(), Edit.delete(cage()), LIGHT)
     assert len(patch.sources) > 50
     assert (np.abs(field.sh[patch.sources, 1:]).max(axis=(1, 2)) == 0.0).mean() > 0.95
     assert (np.abs(np.log(patch.gains)) < 0.3).mean() > 0.95
@@ -152,7 +152,7 @@ def test_a_moved_box_takes_its_shadow_along():
 def test_later_edits_take_the_fill_along_and_a_pages_splats_are_the_same():
     field = room(True)
     first = Edit.delete(cage())
-    patch = splat_patch_of(field, EditStack(), first, LIGHT)
+    patch = build_splat_patch(field, EditStack(), first, LIGHT)
     spot = Cage.box((0.1, 0.0, 0.0), (0.5, 0.5, 0.2))
     second = Edit(spot, adjustment="discrete", fill="none", relight="none").translate([0.0, 0.0, 0.4])
     stack = EditStack([first.replace(patch=patch), second])
@@ -180,7 +180,7 @@ def test_a_clone_is_made_of_the_splats_of_its_cage():
     field = room(True)
     source = Cage.box((-0.6, -0.5, 0.05), (0.62, 0.62, 0.3))
     edit = Edit.delete(Cage.box((0.1, 0.0, 0.05), (0.62, 0.62, 0.3))).replace(fill=Clone(source))
-    patch = splat_patch_of(field, EditStack(), edit, None)
+    patch = build_splat_patch(field, EditStack(), edit, None)
     inside = source.contains(field.means.astype(np.float64))
     assert sorted(patch.sources) == list(np.flatnonzero(inside))
     np.testing.assert_allclose(patch.points, field.means[patch.sources] + [0.7, 0.5, 0.0], atol=1e-5)
@@ -217,7 +217,7 @@ def test_scenes_fill_and_relight_splats_unless_told_not_to():
 
 def test_voxelised_splats_are_as_opaque_and_as_coloured():
     field = room(False)
-    voxels = voxelised(field, np.array([[-0.5, -0.5, -0.2], [0.5, 0.5, 0.2]]), 0.025)
+    voxels = voxelize_splats(field, np.array([[-0.5, -0.5, -0.2], [0.5, 0.5, 0.2]]), 0.025)
     z = voxels.vertices % voxels.resolution[2]
     low = voxels.bounds[0, 2]
     column = np.bincount(voxels.vertices // voxels.resolution[2], voxels.density * 0.025)
@@ -237,7 +237,7 @@ def test_voxelised_splats_are_as_opaque_and_as_coloured():
 def test_nothing_to_fill_and_no_splats_at_all_make_empty_patches():
     field = room(False)
     nowhere = Edit.delete(Cage.box((0.0, 0.0, 3.0), (0.4, 0.4, 0.4)))
-    patch = splat_patch_of(field, EditStack(), nowhere, LIGHT)
+    patch = build_splat_patch(field, EditStack(), nowhere, LIGHT)
     assert not len(patch.sources) and not patch.gone.any()
     none = field.take(np.zeros(len(field), bool))
-    assert not len(splat_patch_of(none, EditStack(), Edit.delete(cage()), LIGHT).sources)
+    assert not len(build_splat_patch(none, EditStack(), Edit.delete(cage()), LIGHT).sources)

@@ -8,17 +8,17 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cagefield.cameras.camera import Camera
-from cagefield.completion.lighting.ambient_occlusion import Ambience
-from cagefield.completion.surfaces.grid_block import block_of
+from cagefield.completion.lighting.ambient_occlusion import LightModel
+from cagefield.completion.surfaces.grid_block import extract_block
 from cagefield.completion.surfaces.plane_snapping import flattened
 from cagefield.completion.surfaces.surfels import (
-    FAR,
+    FAR_DISTANCE,
     Surfels,
-    cut_through,
-    gridded,
-    joined,
-    surfels_of,
-    with_seen,
+    build_distance_grid,
+    concatenate_surfels,
+    extract_cut_faces,
+    extract_surfels,
+    prefer_visible,
 )
 from cagefield.edits import Edit, EditStack
 from cagefield.fields.voxel_field import VoxelField
@@ -73,22 +73,22 @@ def sphere(count: int, centre: Array, radius: float, seed: int) -> Surfels:
 
 
 def test_surfaces_are_where_half_of_the_light_is_stopped() -> None:
-    block = block_of(slab(), EditStack(), np.array([[-0.5, -0.5, -0.2], [0.5, 0.5, 0.25]]))
-    surface = surfels_of(block)
+    block = extract_block(slab(), EditStack(), np.array([[-0.5, -0.5, -0.2], [0.5, 0.5, 0.25]]))
+    surface = extract_surfels(block)
     up = surface.normals[:, 2] > 0.99
     assert up.sum() > 300
     # A step of the walk inwards is a quarter of a voxel.
     assert np.abs(surface.points[up, 2] - TOP).max() < 0.25 * VOXEL
     above = np.array([[0.1, 0.2, TOP + 0.2], [0.1, 0.2, TOP - 0.1], [9.0, 0.0, 0.0]])
     found = surface.distance(above, 0.3)
-    assert abs(found[0] - 0.2) < 0.25 * VOXEL and found[1] == 0.0 and found[2] == FAR
+    assert abs(found[0] - 0.2) < 0.25 * VOXEL and found[1] == 0.0 and found[2] == FAR_DISTANCE
 
 
 def test_a_block_of_nothing_has_no_surface() -> None:
-    block = block_of(slab(), EditStack(), np.array([[0.5, 0.5, 0.5], [0.9, 0.9, 0.9]]))
-    surface = surfels_of(block)
-    assert len(surface.points) == 0 and (surface.distance(np.zeros((2, 3))) == FAR).all()
-    assert (gridded([surface], 0.1)(np.zeros((2, 3))) == FAR).all()
+    block = extract_block(slab(), EditStack(), np.array([[0.5, 0.5, 0.5], [0.9, 0.9, 0.9]]))
+    surface = extract_surfels(block)
+    assert len(surface.points) == 0 and (surface.distance(np.zeros((2, 3))) == FAR_DISTANCE).all()
+    assert (build_distance_grid([surface], 0.1)(np.zeros((2, 3))) == FAR_DISTANCE).all()
     assert surface.thinned(0.1) is surface
 
 
@@ -96,7 +96,7 @@ def test_distances_on_a_grid_are_those_to_the_nearest() -> None:
     ball = sphere(20_000, np.zeros(3), 0.5, 0)
     asked = np.random.default_rng(1).uniform(-0.9, 0.9, (500, 3))
     asked = asked[np.linalg.norm(asked, axis=1) > 0.55]
-    exact, fast = ball.distance(asked), gridded([ball], 0.02)(asked)
+    exact, fast = ball.distance(asked), build_distance_grid([ball], 0.02)(asked)
     np.testing.assert_allclose(exact, np.linalg.norm(asked, axis=1) - 0.5, atol=0.02)
     within = (np.abs(asked) < 0.5).all(axis=1)
     np.testing.assert_allclose(fast[within], exact[within], atol=0.035)  # a cell's diagonal
@@ -111,16 +111,16 @@ def test_only_what_the_way_passed_through_is_deep_shade() -> None:
     up, down = np.tile([0.0, 0.0, 1.0], (len(flat), 1)), np.tile([0.0, 0.0, -1.0], (len(flat), 1))
     reaches = (0.02, 0.04, 0.08, 0.16, 0.24)
     sheet = Surfels(flat + np.array([0.0, 0.0, 0.2]), up)
-    near = joined([ground, sheet]).nearness(ground, reaches)[0]
+    near = concatenate_surfels([ground, sheet]).nearness(ground, reaches)[0]
     np.testing.assert_allclose(near, [0, 0, 0, 1 - 0.04 / 0.16, 1 - 0.04 / 0.24], atol=0.06)
     lid = Surfels(flat + np.array([0.0, 0.0, 0.1]), down)
-    both = joined([ground, sheet, lid]).nearness(ground, reaches)[0]
+    both = concatenate_surfels([ground, sheet, lid]).nearness(ground, reaches)[0]
     np.testing.assert_allclose(both, [0, 0, 1 - 0.02 / 0.08, 1, 1 - 0.04 / 0.24], atol=0.06)
 
 
 def test_cages_cut_through_what_is_solid() -> None:
-    block = block_of(slab(), EditStack(), np.array([[-0.9, -0.9, -0.5], [0.9, 0.9, 0.25]]))
-    cut = cut_through(block, Cage.box((0.0, 0.0, 0.0), (0.8, 0.4, 0.4), rotation=(0.0, 0.0, 0.3)))
+    block = extract_block(slab(), EditStack(), np.array([[-0.9, -0.9, -0.5], [0.9, 0.9, 0.25]]))
+    cut = extract_cut_faces(block, Cage.box((0.0, 0.0, 0.0), (0.8, 0.4, 0.4), rotation=(0.0, 0.0, 0.3)))
     assert (np.abs(np.linalg.norm(cut.normals, axis=1) - 1.0) < 1e-12).all()
     assert (cut.points[:, 2] < 0.5 * VOXEL).all()
     floor = cut.normals[:, 2] < -0.99
@@ -128,12 +128,12 @@ def test_cages_cut_through_what_is_solid() -> None:
     # Of the four walls what is below the slab's top: half of each.
     assert not (cut.normals[:, 2] > 0.01).any() and abs((~floor).sum() - 2 * (16 + 8) * 4) <= 2 * (16 + 8)
     assert ((cut.points * cut.normals)[~floor].sum(axis=1) > 0.19).all()
-    nothing = cut_through(block, Cage.box((0.0, 0.0, 0.15), (0.2, 0.2, 0.1)))
+    nothing = extract_cut_faces(block, Cage.box((0.0, 0.0, 0.15), (0.2, 0.2, 0.1)))
     assert nothing.points.shape == (0, 3)
 
 
 def test_thinned_surfaces_keep_both_sides() -> None:
-    both = joined(
+    both = concatenate_surfels(
         [plane(4000, 0.0, 0), Surfels(plane(4000, 0.0, 1).points, np.tile([0.0, 0.0, -1.0], (4000, 1)))]
     )
     thin = both.thinned(0.2)
@@ -145,13 +145,13 @@ def test_thinned_surfaces_keep_both_sides() -> None:
 def test_surfaces_far_away_are_thinned_too() -> None:
     near = plane(500, 0.0, 8)
     far = Surfels(np.array([[1e9, -1e9, 1e9], [-1e9, 1e9, -1e9]]), np.tile([0.0, 0.0, 1.0], (2, 1)))
-    thin = joined([near, far]).thinned(0.01)
+    thin = concatenate_surfels([near, far]).thinned(0.01)
     assert len(thin.points) > 400 and (np.abs(thin.points).max(axis=1) > 1e8).sum() == 2
 
 
 def test_planes_get_their_normals_and_spheres_keep_theirs() -> None:
     floor, ball = plane(6000, 0.004, 2), sphere(3000, np.array([0.0, 0.0, 0.6]), 0.3, 3)
-    flat, on = flattened(joined([floor, ball]), 0.01)
+    flat, on = flattened(concatenate_surfels([floor, ball]), 0.01)
     assert on[:6000].mean() > 0.8 and on[6000:].mean() < 0.12
     assert np.degrees(np.arccos(flat.normals[:6000][on[:6000], 2])).max() < 0.5
     assert np.abs(flat.points[:6000][on[:6000], 2]).max() < 0.001
@@ -167,7 +167,7 @@ def test_bumps_amid_a_plane_are_put_on_it_and_its_edge_keeps_its_normals() -> No
     rim = np.stack(
         [chance.uniform(1.0, 1.02, 200), chance.uniform(-1.0, 1.0, 200), np.full(200, -0.02)], axis=1
     )
-    surface = joined([top, bumps, Surfels(rim, tilted)])
+    surface = concatenate_surfels([top, bumps, Surfels(rim, tilted)])
     flat, on = flattened(surface, 0.05, edges=True)
     assert on[:6000].all() and on[6000:6200].mean() > 0.98 and on[6200:].mean() < 0.02
     np.testing.assert_array_equal(flat.normals[6200:][~on[6200:]], tilted[~on[6200:]])
@@ -180,13 +180,15 @@ def test_what_cameras_see_replaces_what_lies_beneath() -> None:
     hidden = Surfels(beneath.points - [0.0, 0.0, 0.03], beneath.normals)
     aside = Surfels(beneath.points - [0.0, 0.0, -0.5], beneath.normals)
     level = Surfels(seen.points, np.tile([0.0, 0.0, 1.0], (3000, 1)))
-    found = with_seen(joined([hidden, aside]), level, 0.01)
+    found = prefer_visible(concatenate_surfels([hidden, aside]), level, 0.01)
     assert len(found.points) == 3500 and (found.points[:, 2] > -0.01).all()
 
 
 def test_a_rigid_motion_leaves_a_parts_shade_on_itself() -> None:
-    part = joined([sphere(2000, np.zeros(3), 0.3, 6), sphere(2000, np.array([0.7, 0.0, 0.0]), 0.3, 7)])
-    light = Ambience((0.1, 0.3), (0.3, 0.4))
+    part = concatenate_surfels(
+        [sphere(2000, np.zeros(3), 0.3, 6), sphere(2000, np.array([0.7, 0.0, 0.0]), 0.3, 7)]
+    )
+    light = LightModel((0.1, 0.3), (0.3, 0.4))
     turn = Rotation.from_euler("XYZ", (0.4, -0.8, 1.1)).as_matrix()
     moved = part.turned(part.points @ turn.T + [3.0, -2.0, 1.0], np.broadcast_to(turn, (4000, 3, 3)))
     before, after = light.log_light([part], part), light.log_light([moved], moved)
@@ -198,7 +200,7 @@ def test_stacked_edits_keep_densities_below_zero() -> None:
     """They make the surfaces beside them sharp, and their colours show there."""
     field = slab(sharp=True)
     moved = Edit(Cage.box((0.0, 0.0, 0.5), 0.5), adjustment="discrete").translate((0.3, 0.1, 0.2))
-    block = block_of(field, EditStack([moved]), np.array([[-0.1, -0.3, 0.3], [0.7, 0.5, 0.95]]))
+    block = extract_block(field, EditStack([moved]), np.array([[-0.1, -0.3, 0.3], [0.7, 0.5, 0.95]]))
     inside = moved.deformed.contains(block.positions(np.ones(block.shape, bool))).reshape(block.shape)
     empty = inside & (block.density < -1.0)
     assert empty.sum() > 50 and (block.slot[empty] >= 0).all()

@@ -26,11 +26,11 @@ import scipy
 from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera
-from cagefield.completion.lighting.ambient_occlusion import Ambience
-from cagefield.completion.lighting.diffuse_irradiance import Facing
-from cagefield.completion.lighting.directional_light import Sun
+from cagefield.completion.lighting.ambient_occlusion import LightModel
+from cagefield.completion.lighting.diffuse_irradiance import DiffuseLight
+from cagefield.completion.lighting.directional_light import DirectionalLight
 from cagefield.completion.surfaces.surfels import Surfels
-from cagefield.completion.surfaces.visibility import SeenPairs, Sight
+from cagefield.completion.surfaces.visibility import CameraVisibility, SurfacePairs
 from cagefield.edits import Edit
 from cagefield.edits.patch import NewLight, Patch, SplatPatch
 from cagefield.fields.splat_field import SplatField
@@ -41,13 +41,13 @@ from cagefield.files.stale_files import remove_unfinished
 from cagefield.files.user_cache import MAX_UNUSED_SECONDS, cache_root, source_digest
 from cagefield.geometry.cage import Cage
 
-LEAST_SECONDS = 0.3
+MIN_CACHED_SECONDS = 0.3
 """What a result must have taken to be kept."""
 
-MOST_BYTES = 1 << 30
+MAX_CACHE_BYTES = 1 << 30
 """Room that all files take at most: those that were not used for longest go. One takes a quarter at most."""
 
-LEFT_BYTES = 1 << 30
+MIN_FREE_BYTES = 1 << 30
 """Room that stays free on the disk, at least."""
 
 VERSIONS = source_digest(), np.__version__, scipy.__version__
@@ -56,23 +56,23 @@ VERSIONS = source_digest(), np.__version__, scipy.__version__
 KINDS: Final = {
     kind.__name__: kind
     for kind in (
-        Ambience,
+        LightModel,
         Cage,
         Camera,
-        Facing,
+        DiffuseLight,
         NewLight,
         Patch,
-        SeenPairs,
-        Sight,
+        SurfacePairs,
+        CameraVisibility,
         SplatPatch,
-        Sun,
+        DirectionalLight,
         Surfels,
         VoxelField,
     )
 }
 """Classes that results consist of."""
 
-Made = TypeVar("Made")
+Result = TypeVar("Result")
 
 
 class DiskCache:
@@ -81,7 +81,7 @@ class DiskCache:
     def __init__(self, field: VoxelField | SplatField, cameras: Sequence[Camera]) -> None:
         self._field, self._cameras = field, cameras
 
-    def get_or_make(self, what: Sequence[object], make: Callable[[], Made]) -> Made:
+    def get_or_make(self, what: Sequence[object], make: Callable[[], Result]) -> Result:
         """What `make` gives: from disk, where it was made before for the same `what`.
 
         `what` holds edits, cages, numbers and texts. What a paste has a part in is not kept.
@@ -90,10 +90,10 @@ class DiskCache:
         if path is None:
             return make()
         with contextlib.suppress(OSError, ValueError):
-            return cast(Made, self._read(path))
+            return cast(Result, self._read(path))
         began = time.perf_counter()
         made = make()
-        if time.perf_counter() - began > LEAST_SECONDS:
+        if time.perf_counter() - began > MIN_CACHED_SECONDS:
             with contextlib.suppress(OSError, ValueError, MemoryError):
                 self._write(path, made)
         return made
@@ -103,7 +103,7 @@ class DiskCache:
         digest = hashlib.sha256()
         for each in (*VERSIONS, importlib.metadata.version("quadrants"), tuple(self._cameras)):
             self._add(digest, each)
-        for name in (each.name for each in _fields(self._field)):
+        for name in (each.name for each in _init_fields(self._field)):
             self._add(digest, getattr(self._field, name))
         return digest.digest()
 
@@ -133,15 +133,15 @@ class DiskCache:
         tree = json.dumps(self._packed(made, arrays)).encode()
         arrays["tree"] = np.frombuffer(tree, np.uint8)
         size = sum(values.nbytes for values in arrays.values())
-        if size > MOST_BYTES // 4:
+        if size > MAX_CACHE_BYTES // 4:
             raise ValueError("it is too large to be kept")
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if shutil.disk_usage(path.parent).free < LEFT_BYTES + size:
+        if shutil.disk_usage(path.parent).free < MIN_FREE_BYTES + size:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         remove_unfinished(path.parent)
         with replaced_file(path) as temporary:
             np.savez(temporary, **cast(Any, arrays))
-        _tidy(path.parent)
+        _evict_files(path.parent)
 
     def _packed(self, value: Any, arrays: dict[str, NDArray[Any]]) -> Any:
         """The value as JSON; its arrays are added to `arrays`, and named in it."""
@@ -156,7 +156,9 @@ class DiskCache:
         if isinstance(value, tuple):
             return {"tuple": [self._packed(each, arrays) for each in value]}
         if type(value) is KINDS.get(type(value).__name__):
-            values = {each.name: self._packed(getattr(value, each.name), arrays) for each in _fields(value)}
+            values = {
+                each.name: self._packed(getattr(value, each.name), arrays) for each in _init_fields(value)
+            }
             return {"kind": type(value).__name__, "values": values}
         raise ValueError(f"{type(value)} is not kept")
 
@@ -190,7 +192,7 @@ class DiskCache:
             if isinstance(value, Edit) and (value.pasted is not None or value.source is not None):
                 raise TypeError("what is pasted may change")
             digest.update(type(value).__name__.encode())
-            for each in _fields(value):
+            for each in _init_fields(value):
                 if not (isinstance(value, Edit) and each.name == "name"):
                     self._add(digest, getattr(value, each.name))
         elif value is None or isinstance(value, (bool, int, float, str, np.generic)):
@@ -199,18 +201,18 @@ class DiskCache:
             raise TypeError(f"a {type(value).__name__}")
 
 
-def _fields(value: Any) -> tuple[dataclasses.Field[Any], ...]:
+def _init_fields(value: Any) -> tuple[dataclasses.Field[Any], ...]:
     return tuple(each for each in dataclasses.fields(value) if each.init)
 
 
-def _tidy(folder: Path) -> None:
+def _evict_files(folder: Path) -> None:
     """Removes what was not used for long, and what was not for longest where all take too much room."""
     found = []
     for path in folder.glob("[!.]*.npz"):
         with contextlib.suppress(OSError):
             status = path.stat()
             found.append((status.st_mtime, status.st_size, path))
-    room = MOST_BYTES
+    room = MAX_CACHE_BYTES
     for used, size, path in sorted(found, reverse=True):
         room -= size
         if room < 0 or time.time() - used > MAX_UNUSED_SECONDS:

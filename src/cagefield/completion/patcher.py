@@ -8,16 +8,21 @@ from functools import cached_property
 from typing import cast
 
 from cagefield.cameras.camera import Camera
-from cagefield.completion.continuous_relighting import bent_block, bent_voxels, light_edit
-from cagefield.completion.discrete_patch import patch_of
-from cagefield.completion.lighting.ambient_occlusion import Ambience, ambience_of, with_facing, with_sun
-from cagefield.completion.pasting.paste_composite import joined
-from cagefield.completion.pasting.paste_loader import Pastes
+from cagefield.completion.continuous_relighting import extract_bent_block, light_edit, relight_voxels
+from cagefield.completion.discrete_patch import build_patch
+from cagefield.completion.lighting.ambient_occlusion import (
+    LightModel,
+    fit_light_model,
+    with_diffuse_light,
+    with_directional_light,
+)
+from cagefield.completion.pasting.paste_composite import composite_paste
+from cagefield.completion.pasting.paste_loader import PasteLoader
 from cagefield.completion.patch_cache import DiskCache
-from cagefield.completion.splat_patch import bent_splats, splat_patch_of
-from cagefield.completion.surfaces.grid_block import Block
-from cagefield.completion.surfaces.splat_voxelization import voxelised_whole
-from cagefield.completion.surfaces.visibility import Sight, sight_of
+from cagefield.completion.splat_patch import build_splat_patch, relight_splats
+from cagefield.completion.surfaces.grid_block import GridBlock
+from cagefield.completion.surfaces.splat_voxelization import voxelize_bounds
+from cagefield.completion.surfaces.visibility import CameraVisibility, render_visibility
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.options import CastShadow
 from cagefield.edits.patch import Pasted, Patch, SplatPatch
@@ -25,7 +30,7 @@ from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.images.render_result import RenderResult
 
-KEPT = 16
+MAX_CACHED_PATCHES = 16
 """Patches that are kept for when they are asked for again."""
 
 Key = tuple[object, ...]
@@ -44,13 +49,13 @@ class Patcher:
         field: VoxelField | SplatField,
         cameras: Sequence[Camera],
         render: Callable[[Camera], RenderResult],
-        pastes: Pastes | None = None,
+        pastes: PasteLoader | None = None,
     ) -> None:
         self._field, self._cameras, self._render, self._pastes = field, cameras, render, pastes
         self._on_disk = DiskCache(field, cameras)
         self._kept: OrderedDict[Key, Patch | SplatPatch | Edit | None] = OrderedDict()
-        self._around: tuple[Key, Block] | None = None
-        self._suns: dict[tuple[float, float, float] | None, Ambience] = {}
+        self._around: tuple[Key, GridBlock] | None = None
+        self._suns: dict[tuple[float, float, float] | None, LightModel] = {}
         self._pasted: OrderedDict[Key, Pasted] = OrderedDict()
 
     def patched(
@@ -83,18 +88,18 @@ class Patcher:
                 if proceed is not None:
                     proceed()
                 edit = edit.replace(pasted=self._joined(tuple(made), edit, moving, preserve_opacity))
-            if wants_patch(edit, feathers=feathers):
+            if needs_patch(edit, feathers=feathers):
                 if proceed is not None:
                     proceed()
                 patch = self._patch(tuple(made), edit, moving, preserve_opacity)
                 edit = edit if patch is None else edit.replace(patch=patch)
-            elif bending and not moving and wants_light(edit):
+            elif bending and not moving and needs_relighting(edit):
                 if proceed is not None:
                     proceed()
                 light = self._light(tuple(made), edit)
                 made += [] if light is None else [light]
             made.append(edit)
-        while len(self._pasted) > max(KEPT, len(made)):
+        while len(self._pasted) > max(MAX_CACHED_PATCHES, len(made)):
             self._pasted.popitem(last=False)
         return EditStack(made)
 
@@ -108,19 +113,20 @@ class Patcher:
         if key not in self._pasted:
             if moving:
                 return edit.pasted
-            self._pasted[key] = joined(self._field, stack, edit, preserve_opacity=preserve_opacity)
+            self._pasted[key] = composite_paste(self._field, stack, edit, preserve_opacity=preserve_opacity)
         self._pasted.move_to_end(key)
         return self._pasted[key]
 
     @cached_property
-    def ambience(self) -> Ambience:
+    def ambience(self) -> LightModel:
         """How the field's colours follow its openness, and where its surfaces face."""
         sight = self._sight  # whoever knows the light has it: drags do not wait for either
         return self._on_disk.get_or_make(
-            ("ambience",), lambda: with_facing(ambience_of(self._voxels, sight), self._voxels, sight)
+            ("ambience",),
+            lambda: with_diffuse_light(fit_light_model(self._voxels, sight), self._voxels, sight),
         )
 
-    def _lit(self, edit: Edit) -> Ambience | None:
+    def _lit(self, edit: Edit) -> LightModel | None:
         """What goes along of the light of an edit; None where all stays."""
         if edit.relight == "none":
             return None
@@ -130,19 +136,19 @@ class Patcher:
         if direction not in self._suns:
             self._suns[direction] = self._on_disk.get_or_make(
                 ("sun", direction),
-                lambda: with_sun(self.ambience, self._voxels, self._sight, direction),
+                lambda: with_directional_light(self.ambience, self._voxels, self._sight, direction),
             )
         return self._suns[direction]
 
     @cached_property
     def _voxels(self) -> VoxelField:
         """The field, or splats as coarsely as light is found out about."""
-        return self._field if isinstance(self._field, VoxelField) else voxelised_whole(self._field)
+        return self._field if isinstance(self._field, VoxelField) else voxelize_bounds(self._field)
 
     @cached_property
-    def _sight(self) -> Sight:
+    def _sight(self) -> CameraVisibility:
         return self._on_disk.get_or_make(
-            ("sight",), lambda: sight_of(self._render, self._cameras, self._field.bounds)
+            ("sight",), lambda: render_visibility(self._render, self._cameras, self._field.bounds)
         )
 
     def _patch(
@@ -164,7 +170,7 @@ class Patcher:
         if key in self._kept:
             self._kept.move_to_end(key)
             return cast("Patch | SplatPatch", self._kept[key])
-        if not wants_patch(edit, moving, feathers=isinstance(self._field, VoxelField)):
+        if not needs_patch(edit, moving, feathers=isinstance(self._field, VoxelField)):
             return None
         ambience = lit if relit else None
         looks = relit or (edit.fill == "surroundings" and not edit.keep_source)
@@ -173,7 +179,7 @@ class Patcher:
 
         def make() -> Patch | SplatPatch:
             if isinstance(self._field, VoxelField):
-                return patch_of(
+                return build_patch(
                     self._field,
                     stack,
                     edit,
@@ -182,7 +188,7 @@ class Patcher:
                     sight=sight,
                     preserve_opacity=preserve_opacity,
                 )
-            return splat_patch_of(self._field, stack, edit, ambience, settled=not moving, sight=sight)
+            return build_splat_patch(self._field, stack, edit, ambience, settled=not moving, sight=sight)
 
         follows_from = ("patch", ambience, *stack.active, edit, preserve_opacity)
         patch = make() if moving else self._on_disk.get_or_make(follows_from, make)
@@ -206,10 +212,10 @@ class Patcher:
                 # While a cage is dragged again and again what is below it stays.
                 around: Key = (*stack.active, edit.outer, lit)
                 if self._around is None or self._around[0] != around:
-                    self._around = around, bent_block(self._field, stack, edit, lit)
-                light = bent_voxels(self._field, stack, edit, lit, self._around[1], self._sight)
+                    self._around = around, extract_bent_block(self._field, stack, edit, lit)
+                light = relight_voxels(self._field, stack, edit, lit, self._around[1], self._sight)
             else:
-                light = bent_splats(self._field, stack, edit, lit, self._sight)
+                light = relight_splats(self._field, stack, edit, lit, self._sight)
             return None if light is None else light.patch
 
         patch = self._on_disk.get_or_make(("light", lit, *stack.active, edit), make)
@@ -219,11 +225,11 @@ class Patcher:
 
     def _keep(self, key: Key, found: Patch | SplatPatch | Edit | None) -> None:
         self._kept[key] = found
-        while len(self._kept) > KEPT:
+        while len(self._kept) > MAX_CACHED_PATCHES:
             self._kept.popitem(last=False)
 
 
-def wants_patch(edit: Edit, moving: bool = False, *, feathers: bool = True) -> bool:
+def needs_patch(edit: Edit, moving: bool = False, *, feathers: bool = True) -> bool:
     """True for an edit that is shown, and leaves something to be filled or put into another light.
 
     `feathers`: or that has a seam, which splats have not.
@@ -236,7 +242,7 @@ def wants_patch(edit: Edit, moving: bool = False, *, feathers: bool = True) -> b
     return edit.fill != "none" or edit.relight != "none" or (seam and not edit.deleted)
 
 
-def wants_light(edit: Edit) -> bool:
+def needs_relighting(edit: Edit) -> bool:
     """True for a continuous edit that is shown and takes light along."""
     return (
         edit.adjustment == "continuous"

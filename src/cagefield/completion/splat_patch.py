@@ -13,20 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.completion.continuous_relighting import (
-    bending_light,
-    filled,
-    in_light_of,
+    apply_bent_light,
+    compute_bent_light,
+    inpaint_shaded_support,
     light_box,
     light_edit,
 )
-from cagefield.completion.discrete_patch import made_of
-from cagefield.completion.inpainting.splat_inpainting import NONE, KnownSplats
-from cagefield.completion.lighting.ambient_occlusion import Ambience
-from cagefield.completion.lighting.light_change import Lighting
-from cagefield.completion.surfaces.grid_block import Block, block_of
+from cagefield.completion.discrete_patch import compute_patch
+from cagefield.completion.inpainting.splat_inpainting import NO_SPLATS, KnownSplats
+from cagefield.completion.lighting.ambient_occlusion import LightModel
+from cagefield.completion.lighting.light_change import LightChange
+from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
 from cagefield.completion.surfaces.patch_bounds import patch_box
-from cagefield.completion.surfaces.splat_voxelization import voxel_for, voxelised
-from cagefield.completion.surfaces.visibility import Sight
+from cagefield.completion.surfaces.splat_voxelization import choose_voxel_size, voxelize_splats
+from cagefield.completion.surfaces.visibility import CameraVisibility
 from cagefield.edits import Edit
 from cagefield.edits.options import Clone
 from cagefield.edits.patch import NewLight, SplatPatch
@@ -38,78 +38,86 @@ from cagefield.rendering.splats.splat_motion import MovedSplats, moved_splats
 from cagefield.rendering.splats.splat_provenance import with_pasted
 from cagefield.typing import AnyArray, Array, Mask
 
-OTHER = 0.2
+MIN_FILL_DIFFERENCE = 0.2
 """Splats stay where what was filled has the density that was there, and coefficients that differ by less."""
 
 
-def splat_patch_of(
+def build_splat_patch(
     field: SplatField,
     below: EditStack,
     edit: Edit,
-    ambience: Ambience | None,
+    ambience: LightModel | None,
     *,
     settled: bool = True,
-    sight: Sight | None = None,
+    sight: CameraVisibility | None = None,
 ) -> SplatPatch:
     """The patch of a discrete edit of splats under the edits below it; arguments as for `making.made_of`."""
     # Splats overlap: their seams are soft.
     edit = edit.replace(feather=0.0)
     field = with_pasted(field, below.append(edit))
-    lit = ambience if ambience is not None and ambience.shows else Ambience((), ())
+    lit = ambience if ambience is not None and ambience.shows else LightModel((), ())
     place = settled and not edit.deleted
-    moved = _around(
-        field, moved_splats(field, below), _box_of(edit, patch_box(edit, 0.0, lit.reach, falls=lit.falls))
+    moved = _crop_splats(
+        field,
+        moved_splats(field, below),
+        _include_clone_source(edit, patch_box(edit, 0.0, lit.reach, falls=lit.falls)),
     )
     splats = where_they_are(field, moved)
-    voxel = voxel_for(splats, patch_box(edit, 0.0, lit.reach, settled=place, falls=lit.falls))
+    voxel = choose_voxel_size(splats, patch_box(edit, 0.0, lit.reach, settled=place, falls=lit.falls))
     box = patch_box(edit, voxel, lit.reach, settled=place, falls=lit.falls) + 3.0 * voxel * np.array(
         [[-1.0], [1.0]]
     )
-    grid = voxelised(splats, _box_of(edit, box), voxel)
+    grid = voxelize_splats(splats, _include_clone_source(edit, box), voxel)
     after = None
     if edit.source is not None:
-        pasted = _around(field, moved_splats(field, below.append(edit)), box)
-        after = voxelised(where_they_are(field, pasted), _box_of(edit, box), voxel)
-    made = made_of(
+        pasted = _crop_splats(field, moved_splats(field, below.append(edit)), box)
+        after = voxelize_splats(where_they_are(field, pasted), _include_clone_source(edit, box), voxel)
+    made = compute_patch(
         grid, EditStack(), edit, ambience, settled=settled, sight=None if below.active else sight, after=after
     )
-    known, new = KnownSplats.of(field, splats, grid, moved), NONE
-    fresh = made.under.differs(made.emptied, OTHER)
+    known, new = KnownSplats.of(field, splats, grid, moved), NO_SPLATS
+    fresh = made.under.differs(made.emptied, MIN_FILL_DIFFERENCE)
     if isinstance(edit.fill, Clone) and not edit.keep_source:
         new = known.cloned(made.under, edit.inner, edit.fill.source)
     elif made.support is not None:
         new = known.filled(made.under, fresh, made.work.region, edit.inner, made.support)
-    part = None if made.part_light is None else _new_light(made.before, made.part_light)
-    light = _new_light(made.under, made.light)
+    part = None if made.part_light is None else _to_new_light(made.before, made.part_light)
+    light = _to_new_light(made.under, made.light)
     return known.patch(field, made.work.region, fresh & ~made.inside, light, part, new)
 
 
-def bent_splats(
-    field: SplatField, below: EditStack, edit: Edit, ambience: Ambience, sight: Sight | None = None
+def relight_splats(
+    field: SplatField,
+    below: EditStack,
+    edit: Edit,
+    ambience: LightModel,
+    sight: CameraVisibility | None = None,
 ) -> Edit:
     """The edit that changes the light of splats under a continuous edit
     (`completion.continuous_relighting`)."""
     field = with_pasted(field, below)
     box = light_box(edit, 0.0, ambience.reach, ambience.falls)
-    moved = _around(field, moved_splats(field, below), box)
+    moved = _crop_splats(field, moved_splats(field, below), box)
     splats = where_they_are(field, moved)
-    voxel = voxel_for(splats, box)
+    voxel = choose_voxel_size(splats, box)
     box = light_box(edit, voxel, ambience.reach, ambience.falls)
-    region, grid = Cage.box(box.mean(axis=0), box[1] - box[0]), voxelised(splats, box, voxel)
-    block = block_of(grid, EditStack(), box)
-    bent = bending_light(block, edit, ambience)
-    relit, light = in_light_of(block, bent)
+    region, grid = Cage.box(box.mean(axis=0), box[1] - box[0]), voxelize_splats(splats, box, voxel)
+    block = extract_block(grid, EditStack(), box)
+    bent = compute_bent_light(block, edit, ambience)
+    relit, light = apply_bent_light(block, bent)
     known = KnownSplats.of(field, splats, grid, moved)
-    new, gone = NONE, np.zeros(block.shape, bool)
+    new, gone = NO_SPLATS, np.zeros(block.shape, bool)
     if edit.fill == "surroundings":
-        under, support = filled(relit, edit, bent, EditStack(), None if below.active else sight)
+        under, support = inpaint_shaded_support(
+            relit, edit, bent, EditStack(), None if below.active else sight
+        )
         if support is not None:
-            gone = under.differs(relit, OTHER)
+            gone = under.differs(relit, MIN_FILL_DIFFERENCE)
             new = known.filled(under, gone, region, edit.inner, support)
-    return light_edit(edit, known.patch(field, region, gone, _new_light(block, light), None, new))
+    return light_edit(edit, known.patch(field, region, gone, _to_new_light(block, light), None, new))
 
 
-def _box_of(edit: Edit, box: Array) -> Array:
+def _include_clone_source(edit: Edit, box: Array) -> Array:
     """A box [2,3], grown by the cage that an edit clones."""
     if not isinstance(edit.fill, Clone):
         return box
@@ -117,7 +125,7 @@ def _box_of(edit: Edit, box: Array) -> Array:
     return np.stack([np.minimum(box[0], source[0]), np.maximum(box[1], source[1])])
 
 
-def _around(field: SplatField, moved: MovedSplats, box: Array) -> MovedSplats:
+def _crop_splats(field: SplatField, moved: MovedSplats, box: Array) -> MovedSplats:
     """Those of a field's splats that may reach into a box [2,3], half as large again."""
     box = box + 0.25 * (box[1] - box[0]) * np.array([[-1.0], [1.0]])
 
@@ -131,6 +139,6 @@ def _around(field: SplatField, moved: MovedSplats, box: Array) -> MovedSplats:
     return MovedSplats(left, moved.source[here], moved.points[here], moved.jacobian[here], gains)
 
 
-def _new_light(block: Block, light: Lighting | None) -> NewLight:
+def _to_new_light(block: GridBlock, light: LightChange | None) -> NewLight:
     """The light on a block; none at all where it stays."""
-    return (light or Lighting(np.zeros(block.shape, bool), np.zeros(0))).on_grid(block)
+    return (light or LightChange(np.zeros(block.shape, bool), np.zeros(0))).on_grid(block)

@@ -430,7 +430,7 @@ class Scene:
     @cached_property
     def patcher(self) -> Patcher:
         """Patcher that inpaints uncovered places and relights edits; shared by `with_edits`."""
-        from cagefield.completion.pasting.paste_loader import Pastes
+        from cagefield.completion.pasting.paste_loader import PasteLoader
         from cagefield.completion.patcher import Patcher
         from cagefield.rendering.renderers import renderer_of
 
@@ -439,7 +439,7 @@ class Scene:
         def render(camera: Camera) -> RenderResult:
             return cast(RenderResult, plain().render(camera, background="black", normals=True))
 
-        return Patcher(self.field, self.cameras.get("train", ()), render, Pastes(self.sources))
+        return Patcher(self.field, self.cameras.get("train", ()), render, PasteLoader(self.sources))
 
     @property
     def patched_edits(self) -> EditStack:

@@ -13,24 +13,24 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from cagefield.completion.surfaces.grid_block import Block, sampled
+from cagefield.completion.surfaces.grid_block import GridBlock, sample_edited_field
 from cagefield.edits import EditStack
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Mask
 from cagefield.warps.hexahedron_map import HexahedronMap
 
-NEAREST = 24
+RIM_NEIGHBORS = 24
 """Differences at the rim that a vertex takes the mean of."""
 
 
-def cloned(
-    block: Block,
+def clone_cage(
+    block: GridBlock,
     below: EditStack,
     cages: tuple[Cage, Cage],
     inside: Mask,
     surface: Mask,
     preserve_opacity: bool = True,
-) -> Block:
+) -> GridBlock:
     """The block with the vertices in V^c, `inside` [X,Y,Z], showing what is in the source cage.
 
     cages: (V^c, the source cage). surface [X,Y,Z]: the surface vertices around V^c, to whose colours it is
@@ -42,12 +42,14 @@ def cloned(
     within, found, jacobian = HexahedronMap(source, inner)(points)
     density, sh = np.zeros(len(points), np.float32), np.zeros((len(points), *block.sh.shape[1:]), np.float32)
     turn = np.asarray(np.linalg.inv(jacobian), np.float64)
-    density[within], sh[within] = sampled(block.field, below, found, turn, preserve_opacity=preserve_opacity)
+    density[within], sh[within] = sample_edited_field(
+        block.field, below, found, turn, preserve_opacity=preserve_opacity
+    )
     filled = block.with_density(where, density, slots=True)
     coefficients = filled.sh.copy()
     rows = filled.slot[where]
     coefficients[rows] = sh
-    filled = Block(block.field, block.low, filled.density, filled.slot, coefficients)
+    filled = GridBlock(block.field, block.low, filled.density, filled.slot, coefficients)
     # Pairs across the faces of V^c, both of them at a surface.
     rim = ndimage.binary_dilation(inside, iterations=2) & surface
     solid = filled.solid
@@ -66,7 +68,7 @@ def cloned(
     own = coefficients[filled.slot[tuple(at.T)]].reshape(-1, width)
     there = coefficients[filled.slot[tuple(to[nearest].T)]].reshape(-1, width)
     places = np.argwhere(where)
-    count = min(NEAREST, len(at))
+    count = min(RIM_NEIGHBORS, len(at))
     distance, chosen = cKDTree(at).query(places, k=[*range(1, count + 1)])
     facing_same = np.einsum("nc,nkc->nk", along[where], along[tuple(at.T)][chosen])
     weight = np.maximum(facing_same, 0.01) / np.maximum(distance, 0.5) ** 2

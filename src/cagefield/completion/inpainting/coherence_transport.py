@@ -20,66 +20,79 @@ from scipy import ndimage
 
 from cagefield.typing import Array, Mask
 
-FINE, WIDE = 0.8, 3.0
-"""Standard deviations of the colours' and of the tensor's smoothing, columns."""
+COLOR_DEVIATION_COLUMNS = 0.8
+"""Standard deviation of the Gaussian that smooths colors, columns."""
 
-STEP = 0.5
+TENSOR_DEVIATION_COLUMNS = 3.0
+"""Standard deviation of the Gaussian that smooths the structure tensor, columns."""
+
+LINE_STEP_COLUMNS = 0.5
 """Columns from one point of a line to the next."""
 
-BEYOND = 12
+RIM_SAMPLE_COLUMNS = 12
 """Columns beyond the rim whose mean is what a line brings along."""
 
-LONGEST = 3.0
+MAX_LINE_HOLE_SIZES = 3.0
 """Lines that go on for longer than so many times the hole's size lead nowhere."""
 
 
 @dataclass(frozen=True, eq=False)
-class Grain:
+class TextureOrientation:
     """Unit directions [U,V,2] of the lines of a texture, and how alike these are [U,V]: 0 to 1."""
 
     along: Array
     alike: Array
 
 
-def grain_of(values: Array, given: Mask, span: Callable[[Mask, Array], Array]) -> Grain:
+def estimate_orientation(
+    values: Array, given: Mask, span: Callable[[Mask, Array], Array]
+) -> TextureOrientation:
     """The grain of values [U,V] where they are given [U,V], and beyond, by a membrane `span`."""
-    smooth = smoothed(values[..., None], given)[..., 0]
+    smooth = smooth_columns(values[..., None], given)[..., 0]
     slope = np.stack([np.gradient(smooth, axis=axis) for axis in (0, 1)], axis=-1)
     whole = ndimage.binary_erosion(given, np.ones((3, 3), bool))
     tensor = np.einsum("uvi,uvj->uvij", slope, slope)[..., (0, 0, 1), (0, 1, 1)] * whole[..., None]
-    share = ndimage.gaussian_filter(whole.astype(np.float64), WIDE)
-    tensor = ndimage.gaussian_filter(tensor, (WIDE, WIDE, 0.0)) / np.maximum(share, 1e-6)[..., None]
+    share = ndimage.gaussian_filter(whole.astype(np.float64), TENSOR_DEVIATION_COLUMNS)
+    tensor = (
+        ndimage.gaussian_filter(tensor, (TENSOR_DEVIATION_COLUMNS, TENSOR_DEVIATION_COLUMNS, 0.0))
+        / np.maximum(share, 1e-6)[..., None]
+    )
     known = given & (share > 0.05)
     if not known.any():
-        return Grain(np.zeros((*given.shape, 2)), np.zeros(given.shape))
+        return TextureOrientation(np.zeros((*given.shape, 2)), np.zeros(given.shape))
     a, b, c = np.moveaxis(span(known, tensor.reshape(-1, 3)).reshape(*given.shape, 3), -1, 0)
     # The larger eigenvector is across the lines.
     angle = 0.5 * np.arctan2(2.0 * b, a - c) + 0.5 * np.pi
     apart = (a - c) ** 2 + 4.0 * b**2
     alike = apart / np.maximum((a + c) ** 2, 1e-30)
-    return Grain(np.stack([np.cos(angle), np.sin(angle)], axis=-1), np.clip(alike, 0.0, 1.0))
+    return TextureOrientation(np.stack([np.cos(angle), np.sin(angle)], axis=-1), np.clip(alike, 0.0, 1.0))
 
 
-def smoothed(values: Array, given: Mask) -> Array:
+def smooth_columns(values: Array, given: Mask) -> Array:
     """Values [U,V,C] of columns, each a mean of those nearby that are given [U,V]."""
-    share = ndimage.gaussian_filter(given.astype(np.float64), FINE)[..., None]
+    share = ndimage.gaussian_filter(given.astype(np.float64), COLOR_DEVIATION_COLUMNS)[..., None]
     own = np.where(given[..., None], values, 0.0)
-    return np.asarray(ndimage.gaussian_filter(own, (FINE, FINE, 0.0)) / np.maximum(share, 1e-6))
+    return np.asarray(
+        ndimage.gaussian_filter(own, (COLOR_DEVIATION_COLUMNS, COLOR_DEVIATION_COLUMNS, 0.0))
+        / np.maximum(share, 1e-6)
+    )
 
 
-def streamed(unknown: Mask, given: Mask, table: Array, grain: Grain) -> tuple[Array, Array]:
+def transport_colors(
+    unknown: Mask, given: Mask, table: Array, grain: TextureOrientation
+) -> tuple[Array, Array]:
     """(rows [M,C] for the unknown columns, how much they count [M]: 0 where a line has no two ends).
 
     unknown, given [U,V]; table [U*V,C].
     """
     start = np.argwhere(unknown)
-    longest = LONGEST * (np.sqrt(len(start)) + 1.0)
-    lines = [_followed(start, sign, given, grain, longest) for sign in (1.0, -1.0)]
+    longest = MAX_LINE_HOLE_SIZES * (np.sqrt(len(start)) + 1.0)
+    lines = [_trace_lines(start, sign, given, grain, longest) for sign in (1.0, -1.0)]
     ended = np.flatnonzero(np.isfinite(lines[0].length) & np.isfinite(lines[1].length))
     rows, total = np.zeros((len(start), table.shape[1])), np.zeros(len(start))
     for line in lines:
         weight = 1.0 / np.maximum(line.length[ended], 0.5)
-        rows[ended] += weight[:, None] * _beyond(line, ended, given, table)
+        rows[ended] += weight[:, None] * _rim_means(line, ended, given, table)
         total[ended] += weight
     rows[ended] /= total[ended][:, None]
     return rows, np.where(total > 0.0, grain.alike[unknown], 0.0)
@@ -94,11 +107,13 @@ class _Lines:
     heading: Array
 
 
-def _followed(start: NDArray[np.int64], sign: float, given: Mask, grain: Grain, longest: float) -> _Lines:
+def _trace_lines(
+    start: NDArray[np.int64], sign: float, given: Mask, grain: TextureOrientation, longest: float
+) -> _Lines:
     """Lines from columns [M,2] to what is given [U,V]."""
     at, heading = start.astype(np.float64), sign * grain.along[tuple(start.T)]
     length, going = np.full(len(start), np.inf), np.arange(len(start))
-    for number in range(int(longest / STEP)):
+    for number in range(int(longest / LINE_STEP_COLUMNS)):
         cell = np.round(at[going]).astype(np.int64)
         inside = ((cell >= 0) & (cell < given.shape)).all(axis=1)
         going, cell = going[inside], cell[inside]
@@ -106,18 +121,18 @@ def _followed(start: NDArray[np.int64], sign: float, given: Mask, grain: Grain, 
         along = along * np.where((along * heading[going]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
         heading[going] = along
         there = given[tuple(cell.T)]
-        length[going[there]] = STEP * number
+        length[going[there]] = LINE_STEP_COLUMNS * number
         going = going[~there]
         if not len(going):
             break
-        at[going] += STEP * heading[going]
+        at[going] += LINE_STEP_COLUMNS * heading[going]
     return _Lines(at, length, heading)
 
 
-def _beyond(lines: _Lines, which: NDArray[np.int64], given: Mask, table: Array) -> Array:
+def _rim_means(lines: _Lines, which: NDArray[np.int64], given: Mask, table: Array) -> Array:
     """Means [N,C] of what is given from the ends of some lines [N] on, straight along their headings."""
     total, count = np.zeros((len(which), table.shape[1])), np.zeros(len(which))
-    for step in range(BEYOND):
+    for step in range(RIM_SAMPLE_COLUMNS):
         cell = np.round(lines.end[which] + step * lines.heading[which]).astype(np.int64)
         inside = ((cell >= 0) & (cell < given.shape)).all(axis=1)
         cell[~inside] = 0

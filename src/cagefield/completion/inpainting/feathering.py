@@ -12,20 +12,22 @@ from dataclasses import replace
 import numpy as np
 from scipy import ndimage
 
-from cagefield.completion.surfaces.grid_block import Block, interpolated
+from cagefield.completion.surfaces.grid_block import GridBlock, interpolate_field
 from cagefield.fields.sh_rotation import rotated_sh
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Mask
 from cagefield.warps.hexahedron_map import HexahedronMap
 
-BESIDE = 2
+RIM_MARGIN_VERTICES = 2
 """Vertices beyond the faces that are read between vertices within, and two more."""
 
-OWN = 0.05
+MIN_OWN_COLOR_SHARE = 0.05
 """How much of its own colour what stays whole has at the faces, at least, beside matter as dense."""
 
 
-def feathered(part: Block, there: Block, inner: Cage, deformed: Cage, inside: Mask, width: float) -> Block:
+def feather_rim(
+    part: GridBlock, there: GridBlock, inner: Cage, deformed: Cage, inside: Mask, width: float
+) -> GridBlock:
     """A part's block, whose vertices `inside` [X,Y,Z] lie in V^c, with its rim fading into another block.
 
     `there` is what is in deformed space without the part; the rim is `width` voxels wide. Vertices whose
@@ -33,7 +35,7 @@ def feathered(part: Block, there: Block, inner: Cage, deformed: Cage, inside: Ma
     """
     deep = ndimage.distance_transform_edt(inside)
     own = np.clip((deep - 0.5) / width, 0.0, 1.0)
-    rim = ndimage.binary_dilation(inside, iterations=BESIDE) & (own < 1.0)
+    rim = ndimage.binary_dilation(inside, iterations=RIM_MARGIN_VERTICES) & (own < 1.0)
     affine = HexahedronMap(deformed, inner).affine
     if affine is None:
         rim &= inside
@@ -48,7 +50,7 @@ def feathered(part: Block, there: Block, inner: Cage, deformed: Cage, inside: Ma
     known = ((g >= 0.0) & (g <= np.array(there.shape) - 1.0)).all(axis=1)
     rim[tuple(np.argwhere(rim)[~known].T)] = False
     jacobian = jacobian[known]
-    density, sh = interpolated(there.layer(), moved[known])
+    density, sh = interpolate_field(there.layer(), moved[known])
     # Optical depth is kept: the part's density is multiplied by how much it is stretched.
     density = np.maximum(density, 0.0) * np.cbrt(np.abs(np.linalg.det(jacobian)))
     u, _, v = np.linalg.svd(jacobian)
@@ -61,7 +63,7 @@ def feathered(part: Block, there: Block, inner: Cage, deformed: Cage, inside: Ma
     mixed = part.with_density(rim, dense.astype(np.float32), slots=True)
     rows, had = mixed.slot[rim], part.slot[rim] >= 0
     # What is empty there has no colour that would count: a surface beside it keeps its own.
-    weight = np.where(had, np.maximum(before, OWN * whole + 1e-6), 0.0)
+    weight = np.where(had, np.maximum(before, MIN_OWN_COLOR_SHARE * whole + 1e-6), 0.0)
     other = np.where(new > 1e-6, new, np.where(had, 0.0, 1e-6))
     coefficients = mixed.sh.copy()
     total = np.maximum(weight + other, 1e-12)

@@ -17,8 +17,8 @@ from scipy import ndimage
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
-from cagefield.completion.surfaces.footprint import KNOTS
-from cagefield.completion.surfaces.grid_block import Block, interpolated, world_of
+from cagefield.completion.surfaces.footprint import MAX_SPLINE_KNOTS
+from cagefield.completion.surfaces.grid_block import GridBlock, interpolate_field, world_positions
 from cagefield.completion.surfaces.support_plane import Support
 from cagefield.edits.patch import NewLight, SplatPatch
 from cagefield.fields.sh import C0
@@ -30,34 +30,37 @@ from cagefield.rendering.splats.splat_motion import MovedSplats
 from cagefield.typing import Array, Mask
 from cagefield.warps.hexahedron_map import HexahedronMap
 
-WIDE = 0.7
+SPLAT_WIDTH_VOXELS = 0.7
 """Standard deviation along the surface of a splat that fills, voxels."""
 
-THICK = 0.35
+MAX_THICKNESS_VOXELS = 0.35
 """Most of it across the surface, voxels."""
 
-FLAT = 0.8
+MIN_FLAT_COSINE = 0.8
 """Least cosine between the axis of a splat that lies flat and the surface's normal."""
 
-UPWARDS = 0.3
+MIN_UPPER_COSINE = 0.3
 """Least cosine between the normals of what was filled and of the support."""
 
-ENOUGH = 8
+MIN_FLAT_SPLATS = 8
 """Splats that lie flat, from which on others are not copied."""
 
-FAR, OFF = 12.0, 1.0
-"""Splats show how high the surface is, up to this far from a new one, and how far that may be off; voxels."""
+HEIGHT_RADIUS_VOXELS = 12.0
+"""Radius around the new splats in which known splats give the height of the surface, voxels."""
 
-PLAIN = 1.0
+MAX_HEIGHT_CHANGE_VOXELS = 1.0
+"""Maximum change of height of a new splat, voxels."""
+
+VIEW_DEPENDENCE_WEIGHT = 1.0
 """How much a copied splat's dependence on the view counts, over what its colour is off (log)."""
 
-DARK = 0.02
+MIN_DIVISOR_COLOR = 0.02
 """Colours that are darker than this count as this where they divide."""
 
-OPAQUE = 0.6
+MIN_COPIED_OPACITY = 0.6
 """Opacity of splats that are copied to fill, at least."""
 
-GAINS = (0.1, 10.0)
+COLOR_GAIN_RANGE = (0.1, 10.0)
 """What colours are multiplied by, at least and at most."""
 
 
@@ -65,7 +68,7 @@ NewSplats: TypeAlias = tuple[NDArray[np.int64], Array, Array, Array]
 """New splats: rows [A] of those that they are copies of, where they are [A,3], what their shapes are
 multiplied by [A,3,3], and what their colours are [A,3]."""
 
-NONE: NewSplats = (np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)))
+NO_SPLATS: NewSplats = (np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,40 +97,42 @@ class KnownSplats:
             np.concatenate([np.ones((len(still), 3)), gains]),
         )
 
-    def filled(self, under: Block, fresh: Mask, region: Cage, inner: Cage, support: Support) -> NewSplats:
+    def filled(self, under: GridBlock, fresh: Mask, region: Cage, inner: Cage, support: Support) -> NewSplats:
         """Splats on the surface of what was filled, the support's upper side: `fresh` [X,Y,Z] of a block."""
-        at, normals = _surface(under, fresh, support.normal)
+        at, normals = _upper_surface(under, fresh, support.normal)
         kept = self._beside(under, region, inner, fresh, support.normal)
         if not len(at) or not len(kept):
-            return NONE
+            return NO_SPLATS
         at = self._levelled(kept, under, support, at)
-        points = world_of(under.field, at + under.low)
+        points = world_positions(under.field, at + under.low)
         frames = rotation_matrices(self.splats.quaternions[kept].astype(np.float64))
         scales = np.exp(self.splats.log_scales[kept].astype(np.float64))
-        colours = _colours(under, at)
+        colours = _interpolate_colors(under, at)
         nearest = self._alike(kept, colours)
         frames, scales = frames[nearest], scales[nearest]
         each, thin = np.arange(len(at)), np.argmin(scales, axis=1)
         across = frames[each, :, thin]
         across = across * np.where(np.einsum("ni,ni->n", across, normals) < 0.0, -1.0, 1.0)[:, None]
         voxel = float(under.field.voxel_size.max())
-        wanted = np.full(scales.shape, WIDE * voxel)
-        wanted[each, thin] = np.minimum(scales[each, thin], THICK * voxel)
+        wanted = np.full(scales.shape, SPLAT_WIDTH_VOXELS * voxel)
+        wanted[each, thin] = np.minimum(scales[each, thin], MAX_THICKNESS_VOXELS * voxel)
         shapes = (frames * (wanted / scales)[:, None]) @ np.swapaxes(frames, 1, 2)
-        return kept[nearest], points, _turns(np.asarray(across), normals) @ shapes, colours
+        return kept[nearest], points, _smallest_rotations(np.asarray(across), normals) @ shapes, colours
 
-    def _levelled(self, kept: NDArray[np.int64], under: Block, support: Support, at: Array) -> Array:
+    def _levelled(self, kept: NDArray[np.int64], under: GridBlock, support: Support, at: Array) -> Array:
         """Block coordinates [A,3] taken, by OFF at most, to where some splats' surface goes on."""
         g = self.grid.grid_coordinates(self.splats.means[kept].astype(np.float64)) - under.low
         (uv, height), (to, now) = support.local(g), support.local(at)
-        members = np.flatnonzero(cKDTree(at).query(g, distance_upper_bound=FAR)[0] < FAR)
-        members = members[np.abs(height[members] - np.median(now)) < FAR]
-        if len(members) < ENOUGH:
+        members = np.flatnonzero(
+            cKDTree(at).query(g, distance_upper_bound=HEIGHT_RADIUS_VOXELS)[0] < HEIGHT_RADIUS_VOXELS
+        )
+        members = members[np.abs(height[members] - np.median(now)) < HEIGHT_RADIUS_VOXELS]
+        if len(members) < MIN_FLAT_SPLATS:
             return at
         _, first = np.unique(np.round(uv[members], 3), axis=0, return_index=True)
-        members = members[first][:KNOTS]
+        members = members[first][:MAX_SPLINE_KNOTS]
         spline = RBFInterpolator(uv[members], height[members], neighbors=32, smoothing=1.0)
-        off = np.clip(spline(to) - now, -OFF, OFF)
+        off = np.clip(spline(to) - now, -MAX_HEIGHT_CHANGE_VOXELS, MAX_HEIGHT_CHANGE_VOXELS)
         return np.asarray(at + off[:, None] * support.normal)
 
     def _alike(self, kept: NDArray[np.int64], colours: Array) -> NDArray[np.int64]:
@@ -135,39 +140,46 @@ class KnownSplats:
 
         Where they are and how they lie makes no difference to copies.
         """
-        own, wanted = (np.log(np.maximum(rgb, DARK)) for rgb in (self.colours(kept), colours))
+        own, wanted = (np.log(np.maximum(rgb, MIN_DIVISOR_COLOR)) for rgb in (self.colours(kept), colours))
         turning = np.sqrt((self.splats.sh[kept, 1:].astype(np.float64) ** 2).sum(axis=(1, 2)) / (4.0 * np.pi))
-        turning /= np.maximum(self.colours(kept).mean(axis=1), DARK)
-        near = cKDTree(np.c_[own, PLAIN * turning]).query(np.c_[wanted, np.zeros(len(wanted))])[1]
+        turning /= np.maximum(self.colours(kept).mean(axis=1), MIN_DIVISOR_COLOR)
+        near = cKDTree(np.c_[own, VIEW_DEPENDENCE_WEIGHT * turning]).query(
+            np.c_[wanted, np.zeros(len(wanted))]
+        )[1]
         return np.asarray(near)
 
     def _beside(
-        self, under: Block, region: Cage, inner: Cage, fresh: Mask, normal: Array
+        self, under: GridBlock, region: Cage, inner: Cage, fresh: Mask, normal: Array
     ) -> NDArray[np.int64]:
         """Splats beside the hole that lie flat on what it was filled with."""
         splats = self.splats
         means = splats.means.astype(np.float64)
-        found = region.contains(means) & ~inner.contains(means) & (splats.opacities > OPAQUE)
+        found = region.contains(means) & ~inner.contains(means) & (splats.opacities > MIN_COPIED_OPACITY)
         kept = np.flatnonzero(found)
         g = np.round(self.grid.grid_coordinates(means[kept]) - under.low).astype(np.int64)
         g = np.clip(g, 0, np.array(fresh.shape) - 1)
         kept = kept[~fresh[tuple(g.T)]]
         axes = rotation_matrices(splats.quaternions[kept].astype(np.float64))
         thin = np.argmin(splats.log_scales[kept], axis=1)
-        flat = np.abs(axes[np.arange(len(kept)), :, thin] @ normal) > FLAT
-        return kept[flat] if flat.sum() >= ENOUGH else kept
+        flat = np.abs(axes[np.arange(len(kept)), :, thin] @ normal) > MIN_FLAT_COSINE
+        return kept[flat] if flat.sum() >= MIN_FLAT_SPLATS else kept
 
-    def cloned(self, under: Block, inner: Cage, source: Cage) -> NewSplats:
+    def cloned(self, under: GridBlock, inner: Cage, source: Cage) -> NewSplats:
         """Copies of the splats of the source cage, in colours that go with V^c's surroundings."""
         means = self.splats.means.astype(np.float64)
         rows = np.flatnonzero(source.contains(means))
         within, there, shapes = HexahedronMap(inner, source)(means[rows])
         rows = rows[within]
-        now = _colours(under, under.field.grid_coordinates(there) - under.low)
-        before = 0.5 + C0 * interpolated(self.grid, means[rows])[1][:, 0].astype(np.float64)
+        now = _interpolate_colors(under, under.field.grid_coordinates(there) - under.low)
+        before = 0.5 + C0 * interpolate_field(self.grid, means[rows])[1][:, 0].astype(np.float64)
         own = self.colours(rows)
-        known = np.asarray((now > 0.0).all(axis=1) & (before > DARK).all(axis=1))
-        return rows, there, shapes, np.where(known[:, None], own * now / np.maximum(before, DARK), own)
+        known = np.asarray((now > 0.0).all(axis=1) & (before > MIN_DIVISOR_COLOR).all(axis=1))
+        return (
+            rows,
+            there,
+            shapes,
+            np.where(known[:, None], own * now / np.maximum(before, MIN_DIVISOR_COLOR), own),
+        )
 
     def colours(self, rows: NDArray[np.int64]) -> Array:
         """Colours [N,3] of splats, the mean over directions."""
@@ -184,7 +196,7 @@ class KnownSplats:
     ) -> SplatPatch:
         """The patch with new splats of the field's edit; its other arguments are the patch's."""
         rows, points, shapes, colours = new
-        gains = self.gains[rows] * colours / np.maximum(self.colours(rows), DARK)
+        gains = self.gains[rows] * colours / np.maximum(self.colours(rows), MIN_DIVISOR_COLOR)
         return SplatPatch(
             field,
             region,
@@ -194,14 +206,14 @@ class KnownSplats:
             self.rows[rows],
             points,
             shapes @ self.turns[rows],
-            np.clip(gains, *GAINS),
+            np.clip(gains, *COLOR_GAIN_RANGE),
         )
 
 
-def _surface(block: Block, fresh: Mask, up: Array) -> tuple[Array, Array]:
+def _upper_surface(block: GridBlock, fresh: Mask, up: Array) -> tuple[Array, Array]:
     """(block coordinates [A,3], unit normals [A,3]) of the upper side of what is fresh [X,Y,Z]."""
     solid = block.solid
-    found = fresh & solid & ndimage.binary_dilation(~solid) & (block.normals @ up > UPWARDS)
+    found = fresh & solid & ndimage.binary_dilation(~solid) & (block.normals @ up > MIN_UPPER_COSINE)
     vertices, normals = np.argwhere(found).astype(np.float64), block.normals[found].astype(np.float64)
     steps = np.arange(-2.0, 2.25, 0.25)
     along = [
@@ -218,7 +230,7 @@ def _surface(block: Block, fresh: Mask, up: Array) -> tuple[Array, Array]:
     return at[first], normals[first]
 
 
-def _colours(block: Block, at: Array) -> Array:
+def _interpolate_colors(block: GridBlock, at: Array) -> Array:
     """Colours [N,3] of a block at block coordinates [N,3], of what is dense there; 0 where nothing is."""
     weight = np.where(block.slot >= 0, block.depth + 1e-3, 0.0)
     total = ndimage.map_coordinates(weight, at.T, np.float64, order=1)
@@ -231,7 +243,7 @@ def _colours(block: Block, at: Array) -> Array:
     return np.maximum(rgb / np.maximum(total, 1e-6)[:, None], 0.0)
 
 
-def _turns(start: Array, end: Array) -> Array:
+def _smallest_rotations(start: Array, end: Array) -> Array:
     """The smallest rotations [N,3,3] that take unit vectors [N,3] to others, at most a right angle away."""
     axis = np.cross(start, end)
     cosine = np.einsum("ni,ni->n", start, end)

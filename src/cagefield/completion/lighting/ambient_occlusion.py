@@ -22,40 +22,50 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
-from cagefield.completion.lighting.diffuse_irradiance import Facing, TurnedPairs, facing_of, turned_pairs
-from cagefield.completion.lighting.directional_light import Sun, sun_of
-from cagefield.completion.surfaces.charbonnier import noise_of, softened
-from cagefield.completion.surfaces.grid_block import SOLID
-from cagefield.completion.surfaces.surfels import Surfels, gridded
-from cagefield.completion.surfaces.visibility import SeenPairs, Sight
+from cagefield.completion.lighting.diffuse_irradiance import (
+    DiffuseLight,
+    NormalPairs,
+    fit_diffuse_light,
+    sample_normal_pairs,
+)
+from cagefield.completion.lighting.directional_light import DirectionalLight, fit_directional_light
+from cagefield.completion.surfaces.charbonnier import charbonnier_residuals, estimate_noise
+from cagefield.completion.surfaces.grid_block import SOLID_OPTICAL_DEPTH
+from cagefield.completion.surfaces.surfels import Surfels, build_distance_grid
+from cagefield.completion.surfaces.visibility import CameraVisibility, SurfacePairs
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.typing import Array
 
-REACHES = (0.01, 0.02, 0.04, 0.08, 0.12)
+RADII_DIAGONALS = (0.01, 0.02, 0.04, 0.08, 0.12)
 """The reaches r, shares of the diagonal of what the field holds."""
 
-USUAL, SPREAD, CORNER = (0.05, 0.2, 0.25, 0.2, 0.15), 0.2, 0.15
-"""Weights that are usual where light comes from all around: little of it is left in the deepest corner. And
-the standard deviations of each and of their sum."""
+PRIOR_WEIGHTS = (0.05, 0.2, 0.25, 0.2, 0.15)
+"""Prior mean of the weights w: light from all around, of which little reaches the deepest corner."""
 
-ALIKE = 1000.0
+PRIOR_WEIGHT_DEVIATION = 0.2
+"""Prior standard deviation of each weight."""
+
+PRIOR_SUM_DEVIATION = 0.15
+"""Prior standard deviation of the sum of the weights."""
+
+REPEATS_PER_PAIR = 1000.0
 """Pairs that count as one: neighbours, and other views, see the same texture."""
 
-DARKEST = 0.08
+MIN_OPENNESS = 0.08
 """Least openness that counts: colours that are darker still are noise."""
 
-SHOWING = 0.1
+MIN_WEIGHT_SUM = 0.1
 """Sum of the weights from which on contact shadows are there."""
 
-ENOUGH = 150
+MIN_FIT_SAMPLES = 150
 """Pairs from which weights are fitted, at least."""
 
-FINE = 0.4
+SURFEL_CELL_SHARE = 0.4
 """Cells of surfaces that light is found out about with, as a share of the smallest reach."""
 
 
 @dataclass(frozen=True)
-class Ambience:
+class LightModel:
     """How a field's colours follow its openness: reaches [R] in world units, and their weights [R].
 
     And where what faces is brighter, and its dominant light, where that is to go along: that tells of both.
@@ -63,13 +73,13 @@ class Ambience:
 
     reaches: tuple[float, ...]
     weights: tuple[float, ...]
-    facing: Facing | None = None
-    sun: Sun | None = None
+    facing: DiffuseLight | None = None
+    sun: DirectionalLight | None = None
 
     @property
     def shows(self) -> bool:
         """False where colours follow neither openness nor where they face nor a light."""
-        return self.sun is not None or self.facing is not None or sum(self.weights) > SHOWING
+        return self.sun is not None or self.facing is not None or sum(self.weights) > MIN_WEIGHT_SUM
 
     @property
     def reach(self) -> float:
@@ -84,100 +94,108 @@ class Ambience:
     def log_light(self, around: Sequence[Surfels], at: Surfels) -> Array:
         """The log of how bright surface elements [N] are among all the surfaces around, [N]."""
         log = np.zeros(len(at.points))
-        if sum(self.weights) > SHOWING:
-            log += self.log_openness(nearness(around, at, self.reaches))
+        if sum(self.weights) > MIN_WEIGHT_SUM:
+            log += self.log_openness(occlusion_terms(around, at, self.reaches))
         log += self.log_facing(at)
         if self.sun is not None:
-            log += self.sun.log_light(gridded(around, FINE * self.sun.near), at.points, at.normals)
+            log += self.sun.log_light(
+                build_distance_grid(around, SURFEL_CELL_SHARE * self.sun.near), at.points, at.normals
+            )
         return log
 
     def log_facing(self, at: Surfels) -> Array:
         """The share of that which is due to where they face."""
         return np.zeros(len(at.points)) if self.facing is None else self.facing.log_light(at.normals)
 
-    def log_openness(self, nearness: Array) -> Array:
+    def log_openness(self, occlusion_terms: Array) -> Array:
         """log o [N], o at least DARKEST, of nearnesses [N,R]."""
-        return np.asarray(np.log(np.maximum(1.0 - nearness @ np.array(self.weights), DARKEST)))
+        return np.asarray(np.log(np.maximum(1.0 - occlusion_terms @ np.array(self.weights), MIN_OPENNESS)))
 
 
-def nearness(around: Sequence[Surfels], at: Surfels, reaches: Sequence[float]) -> Array:
+def occlusion_terms(around: Sequence[Surfels], at: Surfels, reaches: Sequence[float]) -> Array:
     """max(0, 1 - D(p + r n) / r) [N,R] at surface elements (p, n) [N], for each reach r."""
     return np.asarray(np.max([each.nearness(at, reaches) for each in around], axis=0))
 
 
 def _solid_vertices(field: VoxelField) -> NDArray[np.int64]:
-    return np.asarray(field.vertices[field.density * field.sample_spacing > SOLID])
+    return np.asarray(field.vertices[field.density * field.sample_spacing > SOLID_OPTICAL_DEPTH])
 
 
-def reaches_of(field: VoxelField) -> tuple[float, ...]:
+def occlusion_radii(field: VoxelField) -> tuple[float, ...]:
     """The reaches r at which a field's colours are compared with its openness, world units.
 
     Shares of the diagonal of what is solid; none for a field of less than ENOUGH solid vertices.
     """
     solid = _solid_vertices(field)
-    if len(solid) < ENOUGH:
+    if len(solid) < MIN_FIT_SAMPLES:
         return ()
     at = np.stack(np.unravel_index(solid[:: max(1, len(solid) // 100_000)], field.resolution), axis=1)
     span = np.subtract(*np.percentile(at, [99, 1], axis=0)) * field.voxel_size
-    return tuple(share * float(np.linalg.norm(span)) for share in REACHES)
+    return tuple(share * float(np.linalg.norm(span)) for share in RADII_DIAGONALS)
 
 
-def ambience_of(field: VoxelField, sight: Sight) -> Ambience:
+def fit_light_model(field: VoxelField, sight: CameraVisibility) -> LightModel:
     """The weights that explain the colours of a field's surfaces, as they are seen."""
     pairs = sight.pairs
-    if len(pairs.log_change) < ENOUGH or _solid_vertices(field).size < ENOUGH:
-        return Ambience((), ())
-    reaches = reaches_of(field)
-    around = [sight.surface.thinned(FINE * reaches[0])]
-    first, second = (nearness(around, at, reaches) for at in (pairs.first, pairs.second))
+    if len(pairs.log_change) < MIN_FIT_SAMPLES or _solid_vertices(field).size < MIN_FIT_SAMPLES:
+        return LightModel((), ())
+    reaches = occlusion_radii(field)
+    around = [sight.surface.thinned(SURFEL_CELL_SHARE * reaches[0])]
+    first, second = (occlusion_terms(around, at, reaches) for at in (pairs.first, pairs.second))
     change = pairs.log_change
 
-    usual = np.array(USUAL)
-    noise = noise_of(change)
+    usual = np.array(PRIOR_WEIGHTS)
+    noise = estimate_noise(change)
 
     def residuals(weights: Array) -> Array:
-        ambience = Ambience(reaches, tuple(weights))
+        ambience = LightModel(reaches, tuple(weights))
         told = (ambience.log_openness(second) - ambience.log_openness(first) - change) / noise
-        corner = (weights.sum() - usual.sum()) / CORNER
-        return np.concatenate([softened(told) / np.sqrt(ALIKE), (weights - usual) / SPREAD, [corner]])
+        corner = (weights.sum() - usual.sum()) / PRIOR_SUM_DEVIATION
+        return np.concatenate(
+            [
+                charbonnier_residuals(told) / np.sqrt(REPEATS_PER_PAIR),
+                (weights - usual) / PRIOR_WEIGHT_DEVIATION,
+                [corner],
+            ]
+        )
 
     fit = optimize.least_squares(residuals, usual, bounds=(0.0, 1.0))
-    share = min(1.0, (1.0 - DARKEST) / max(float(fit.x.sum()), 1e-9))
-    return Ambience(reaches, tuple(float(w) * share for w in fit.x))
+    share = min(1.0, (1.0 - MIN_OPENNESS) / max(float(fit.x.sum()), 1e-9))
+    return LightModel(reaches, tuple(float(w) * share for w in fit.x))
 
 
-def with_facing(ambience: Ambience, field: VoxelField, sight: Sight) -> Ambience:
+def with_diffuse_light(ambience: LightModel, field: VoxelField, sight: CameraVisibility) -> LightModel:
     """The ambience, and what where surfaces face makes of the rest, if it makes much."""
-    reaches = reaches_of(field)
+    reaches = occlusion_radii(field)
     if not reaches:
         return ambience
-    pairs = turned_pairs(sight, reaches[1:4])
-    change = pairs.log_change - _told(ambience, sight, reaches, pairs)
-    return replace(ambience, facing=facing_of(pairs.first, pairs.second, change))
+    pairs = sample_normal_pairs(sight, reaches[1:4])
+    change = pairs.log_change - _occlusion_change(ambience, sight, reaches, pairs)
+    return replace(ambience, facing=fit_diffuse_light(pairs.first, pairs.second, change))
 
 
-def _told(
-    ambience: Ambience, sight: Sight, reaches: Sequence[float], pairs: SeenPairs | TurnedPairs
+def _occlusion_change(
+    ambience: LightModel, sight: CameraVisibility, reaches: Sequence[float], pairs: SurfacePairs | NormalPairs
 ) -> Array:
     """The changes of log colour [N] of pairs that openness explains."""
-    if sum(ambience.weights) <= SHOWING:
+    if sum(ambience.weights) <= MIN_WEIGHT_SUM:
         return np.zeros(len(pairs.log_change))
-    around = [sight.surface.thinned(FINE * reaches[0])]
-    first, second = (nearness(around, at, reaches) for at in (pairs.first, pairs.second))
+    around = [sight.surface.thinned(SURFEL_CELL_SHARE * reaches[0])]
+    first, second = (occlusion_terms(around, at, reaches) for at in (pairs.first, pairs.second))
     return ambience.log_openness(second) - ambience.log_openness(first)
 
 
-def with_sun(
-    ambience: Ambience, field: VoxelField, sight: Sight, direction: Sequence[float] | None
-) -> Ambience:
+def with_directional_light(
+    ambience: LightModel, field: VoxelField, sight: CameraVisibility, direction: Sequence[float] | None
+) -> LightModel:
     """The ambience and the dominant light that explains what openness does not, if one does.
 
     `direction` [3] is that to the light, None where it is to be found.
     """
-    reaches, pairs = reaches_of(field), sight.pairs
-    if len(pairs.log_change) < ENOUGH or not reaches:
+    reaches, pairs = occlusion_radii(field), sight.pairs
+    if len(pairs.log_change) < MIN_FIT_SAMPLES or not reaches:
         return ambience
-    change = pairs.log_change - _told(ambience, sight, reaches, pairs)
-    distance = gridded([sight.surface], reaches[0])
-    sun = sun_of(distance, pairs.first, pairs.second, change, reaches, direction)
+    change = pairs.log_change - _occlusion_change(ambience, sight, reaches, pairs)
+    distance = build_distance_grid([sight.surface], reaches[0])
+    sun = fit_directional_light(distance, pairs.first, pairs.second, change, reaches, direction)
     return ambience if sun is None else replace(ambience, facing=None, sun=sun)

@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.completion.surfaces.grid_block import AT_ONCE, Block, block_of, sampled, world_of
+from cagefield.completion.surfaces.grid_block import (
+    VERTICES_PER_BATCH,
+    GridBlock,
+    extract_block,
+    sample_edited_field,
+    world_positions,
+)
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.patch import Pasted
 from cagefield.fields.voxel_field import VoxelField
@@ -21,7 +27,9 @@ from cagefield.typing import Array, Float32, Mask
 from cagefield.warps.hexahedron_map import HexahedronMap
 
 
-def joined(field: VoxelField, below: EditStack, edit: Edit, *, preserve_opacity: bool = True) -> Pasted:
+def composite_paste(
+    field: VoxelField, below: EditStack, edit: Edit, *, preserve_opacity: bool = True
+) -> Pasted:
     """What an edit pastes, with what the field under the edits below shows around it in V.
 
     What is pasted itself where V covers nothing of the field.
@@ -29,27 +37,27 @@ def joined(field: VoxelField, below: EditStack, edit: Edit, *, preserve_opacity:
     pasted = edit.pasted
     if pasted is None or pasted.part is None or pasted.place is None:
         raise edit.unread()
-    block = _block_of_layer(pasted.part)
+    block = _layer_block(pasted.part)
     onto = HexahedronMap(edit.deformed, pasted.place)
-    stored = ndimage.maximum_filter(_stored(field), 3)
+    stored = ndimage.maximum_filter(_stored_mask(field), 3)
     parts = []
-    for begin in range(0, block.density.size, AT_ONCE):
-        some = np.arange(begin, min(begin + AT_ONCE, block.density.size))
-        at = world_of(field, np.stack(np.unravel_index(some, block.shape), axis=1) + block.low)
-        inside, points, jacobian = _mapped(onto, at)
-        near = _near(field, below, stored, points)
+    for begin in range(0, block.density.size, VERTICES_PER_BATCH):
+        some = np.arange(begin, min(begin + VERTICES_PER_BATCH, block.density.size))
+        at = world_positions(field, np.stack(np.unravel_index(some, block.shape), axis=1) + block.low)
+        inside, points, jacobian = _map_points(onto, at)
+        near = _is_near(field, below, stored, points)
         if near.any():
             turn = np.asarray(np.linalg.inv(jacobian[near]), np.float64)
-            raw, sh = sampled(field, below, points[near], turn, preserve_opacity=preserve_opacity)
+            raw, sh = sample_edited_field(field, below, points[near], turn, preserve_opacity=preserve_opacity)
             found = (raw != 0.0) | sh.any(axis=(1, 2))
             parts.append((some[inside][near][found], raw[found], sh[found]))
     if not any((raw > 0.0).any() for _, raw, _ in parts):
         return pasted
     where, raw, sh = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return replace(pasted, part=_together(block, where, raw, sh).layer())
+    return replace(pasted, part=_blend_vertices(block, where, raw, sh).layer())
 
 
-def _together(block: Block, where: NDArray[np.int64], raw: Float32, sh: Float32) -> Block:
+def _blend_vertices(block: GridBlock, where: NDArray[np.int64], raw: Float32, sh: Float32) -> GridBlock:
     """The block with densities [N] and harmonics [N,K,3] put into vertices, flat indices [N]."""
     density, slot = block.density.copy(), block.slot.copy()
     before, known = density.flat[where], slot.flat[where]
@@ -65,7 +73,7 @@ def _together(block: Block, where: NDArray[np.int64], raw: Float32, sh: Float32)
     return replace(block, density=density, slot=slot, sh=np.concatenate([block.sh, mixed]))
 
 
-def _mapped(onto: HexahedronMap, at: Array) -> tuple[Mask, Array, Array]:
+def _map_points(onto: HexahedronMap, at: Array) -> tuple[Mask, Array, Array]:
     """(which [N] of some points have an image, the images [M,3], Jacobians [M,3,3]).
 
     Also of points outside of the cage where the map is affine: its faces are between vertices.
@@ -76,13 +84,13 @@ def _mapped(onto: HexahedronMap, at: Array) -> tuple[Mask, Array, Array]:
     return np.ones(len(at), bool), at @ A.T + b, np.broadcast_to(A, (len(at), 3, 3))
 
 
-def _stored(field: VoxelField) -> Mask:
+def _stored_mask(field: VoxelField) -> Mask:
     stored = np.zeros(field.resolution, bool)
     stored.reshape(-1)[field.vertices] = True
     return stored
 
 
-def _near(field: VoxelField, below: EditStack, stored: Mask, points: Array) -> Mask:
+def _is_near(field: VoxelField, below: EditStack, stored: Mask, points: Array) -> Mask:
     """Which points [N,3] lie beside a vertex that is stored [X,Y,Z], or where edits reach."""
     last = np.array(field.resolution) - 1
     g = np.round(field.grid_coordinates(points)).astype(np.int64)
@@ -93,9 +101,9 @@ def _near(field: VoxelField, below: EditStack, stored: Mask, points: Array) -> M
     return np.asarray(near)
 
 
-def _block_of_layer(layer: VoxelField) -> Block:
+def _layer_block(layer: VoxelField) -> GridBlock:
     """The block of a layer, whose first and last vertex are stored."""
     ends = np.stack(np.unravel_index(layer.vertices[[0, -1]], layer.resolution), axis=1)
-    low, high = world_of(layer, ends)
-    block = block_of(layer, EditStack(), np.stack([low, high]))
+    low, high = world_positions(layer, ends)
+    block = extract_block(layer, EditStack(), np.stack([low, high]))
     return block.cropped(ends[0] - block.low, ends[1] - block.low)

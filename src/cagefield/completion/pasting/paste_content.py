@@ -17,7 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.completion.surfaces.grid_block import AT_ONCE, SOLID, Block, block_of, sampled, world_of
+from cagefield.completion.surfaces.grid_block import (
+    SOLID_OPTICAL_DEPTH,
+    VERTICES_PER_BATCH,
+    GridBlock,
+    extract_block,
+    sample_edited_field,
+    world_positions,
+)
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.patch import Pasted
 from cagefield.errors import EditError
@@ -28,10 +35,10 @@ from cagefield.rendering.splats.bake_splats import baked_splats
 from cagefield.rendering.splats.splitting import split_for_edits
 from cagefield.typing import Array, Mask
 
-MARGIN = 2
+MARGIN_VERTICES = 2
 """Vertices around T(V^c)."""
 
-ALIKE = 1e-6
+MAX_RATIO_DIFFERENCE = 1e-6
 """Voxels whose edges differ by less than this share are of one size."""
 
 
@@ -44,7 +51,7 @@ class SourceContent:
     preserve_opacity: bool = True
 
 
-def pasted(
+def extract_content(
     content: SourceContent, cage: Cage, field: VoxelField | SplatField, *, preserve_opacity: bool = True
 ) -> Pasted:
     """What a paste shows in a field: what a cage of another scene holds.
@@ -53,9 +60,9 @@ def pasted(
     """
     check_kinds(content.field, field)
     if isinstance(field, SplatField) and isinstance(content.field, SplatField):
-        return Pasted(splats=_pasted_splats(content.field, content, cage, field))
+        return Pasted(splats=_extract_splats(content.field, content, cage, field))
     source = cast(VoxelField, content.field)
-    return _pasted_voxels(source, content, cage, cast(VoxelField, field), preserve_opacity)
+    return _extract_voxels(source, content, cage, cast(VoxelField, field), preserve_opacity)
 
 
 def check_kinds(source: VoxelField | SplatField, field: VoxelField | SplatField) -> None:
@@ -82,30 +89,33 @@ def content_box(field: VoxelField | SplatField) -> Array:
     """The box [2,3] of what a field holds: of an unbounded one, and of splats, its box of interest."""
     if isinstance(field, SplatField) or field.contracted:
         return np.asarray(field.bounds)
-    solid = field.vertices[field.density * field.sample_spacing > SOLID]
+    solid = field.vertices[field.density * field.sample_spacing > SOLID_OPTICAL_DEPTH]
     if not len(solid):
         return np.asarray(field.bounds)
     at = np.stack(np.unravel_index(solid, field.resolution), axis=1)
     last = np.array(field.resolution) - 1
-    low, high = np.maximum(at.min(axis=0) - MARGIN, 0), np.minimum(at.max(axis=0) + MARGIN, last)
-    return world_of(field, np.stack([low, high]))
+    low, high = (
+        np.maximum(at.min(axis=0) - MARGIN_VERTICES, 0),
+        np.minimum(at.max(axis=0) + MARGIN_VERTICES, last),
+    )
+    return world_positions(field, np.stack([low, high]))
 
 
-def _pasted_voxels(
+def _extract_voxels(
     source: VoxelField, content: SourceContent, cage: Cage, field: VoxelField, preserve_opacity: bool
 ) -> Pasted:
-    fit = _Fit.of(source, cage, field)
+    fit = _GridPlacement.of(source, cage, field)
     block = fit.copied(content) if fit.whole else fit.resampled(content)
     if not (block.density > 0.0).any():
         raise EditError("its cage holds nothing of that scene; move it over something (inner)")
     density = block.density / np.float32(fit.scale if preserve_opacity else 1.0)
-    sh = _with_terms(block.sh, field.sh.shape[1])
-    layer = Block(field, block.low, density, block.slot, sh).layer()
+    sh = _resize_harmonics(block.sh, field.sh.shape[1])
+    layer = GridBlock(field, block.low, density, block.slot, sh).layer()
     return Pasted(part=layer, place=Cage(fit.there(cage.corners), pivot=fit.there(cage.pivot)))
 
 
 @dataclass(frozen=True, eq=False)
-class _Fit:
+class _GridPlacement:
     """T: a vertex `first` [3] of the source's grid lies on the vertex `low` [3] of the field's.
 
     shape [3]: vertices of the field's block; ratio [3]: voxels of the source along one of the block.
@@ -120,22 +130,22 @@ class _Fit:
     ratio: Array
 
     @classmethod
-    def of(cls, source: VoxelField, cage: Cage, field: VoxelField) -> _Fit:
+    def of(cls, source: VoxelField, cage: Cage, field: VoxelField) -> _GridPlacement:
         own, other = field.voxel_size, source.voxel_size
         low, last = np.zeros(3, np.int64), np.array(field.resolution) - 1
         if field.contracted:
             low, last = -(-last // 4), 3 * last // 4
         box = cage.aabb
         middle = (np.array(source.resolution) - 1) / 2.0
-        first = np.floor((box[0] - source.center) / other + middle).astype(np.int64) - MARGIN
-        start = _uniform(source, first)
-        room = (last - low - MARGIN - 1) * own
+        first = np.floor((box[0] - source.center) / other + middle).astype(np.int64) - MARGIN_VERTICES
+        start = _uniform_position(source, first)
+        room = (last - low - MARGIN_VERTICES - 1) * own
         if (room <= 0.0).any():
             raise EditError(
                 "this scene's grid is too small to hold anything from another one; train it finer"
             )
         scale = float(min((own / other).max(), (room / (box[1] - start)).min()))
-        shape = np.ceil(scale * (box[1] - start) / own).astype(np.int64) + MARGIN
+        shape = np.ceil(scale * (box[1] - start) / own).astype(np.int64) + MARGIN_VERTICES
         return cls(source, field, first, low, np.minimum(shape, last - low + 1), scale, own / scale / other)
 
     @property
@@ -146,33 +156,38 @@ class _Fit:
             ends = np.stack([self.first, self.first + self.shape])
             quarter = (np.array(self.source.resolution) - 1) / 4.0
             inside = bool(((ends >= quarter) & (ends <= 3.0 * quarter)).all())
-        return inside and bool((np.abs(self.ratio - 1.0) * self.shape < ALIKE * self.shape.max()).all())
+        return inside and bool(
+            (np.abs(self.ratio - 1.0) * self.shape < MAX_RATIO_DIFFERENCE * self.shape.max()).all()
+        )
 
     def there(self, points: Array) -> Array:
         """T of points [N,3]."""
-        start, end = _uniform(self.source, self.first), world_of(self.field, self.low[None])[0]
+        start, end = (
+            _uniform_position(self.source, self.first),
+            world_positions(self.field, self.low[None])[0],
+        )
         return np.asarray(end + self.scale * (points - start))
 
-    def copied(self, content: SourceContent) -> Block:
+    def copied(self, content: SourceContent) -> GridBlock:
         """The source's own vertices, at their place in the field's grid."""
         ends = np.stack([self.first + 1, self.first + self.shape - 2])
         last = np.array(self.source.resolution) - 1
-        box = world_of(self.source, np.clip(ends, 0, last))
-        block = block_of(self.source, content.edits, box, preserve_opacity=content.preserve_opacity)
+        box = world_positions(self.source, np.clip(ends, 0, last))
+        block = extract_block(self.source, content.edits, box, preserve_opacity=content.preserve_opacity)
         skipped = np.maximum(self.first - block.low, 0)
         block = block.cropped(skipped, self.first + self.shape - 1 - block.low)
         return replace(block, low=block.low - self.first + self.low)
 
-    def resampled(self, content: SourceContent) -> Block:
+    def resampled(self, content: SourceContent) -> GridBlock:
         """The source between its vertices, at those of the field's grid."""
         density, slot = np.zeros(self.shape, np.float32), np.full(self.shape, -1, np.int64)
-        start, edge = _uniform(self.source, self.first), self.field.voxel_size / self.scale
+        start, edge = _uniform_position(self.source, self.first), self.field.voxel_size / self.scale
         near = np.flatnonzero(self._near(content, start, edge))
         kept, sh = 0, []
-        for begin in range(0, len(near), AT_ONCE):
-            rows = near[begin : begin + AT_ONCE]
+        for begin in range(0, len(near), VERTICES_PER_BATCH):
+            rows = near[begin : begin + VERTICES_PER_BATCH]
             at = np.stack(np.unravel_index(rows, self.shape), axis=1)
-            raw, colours = sampled(
+            raw, colours = sample_edited_field(
                 self.source, content.edits, start + at * edge, preserve_opacity=content.preserve_opacity
             )
             found = (raw != 0.0) | colours.any(axis=(1, 2))
@@ -181,7 +196,7 @@ class _Fit:
             kept += int(found.sum())
             sh.append(colours[found])
         none = np.zeros((0, *self.source.sh.shape[1:]), np.float32)
-        return Block(self.field, self.low, density, slot, np.concatenate([none, *sh]))
+        return GridBlock(self.field, self.low, density, slot, np.concatenate([none, *sh]))
 
     def _near(self, content: SourceContent, start: Array, edge: Array) -> Mask:
         """Vertices [X,Y,Z] of the block beside which the source stores something, or its edits reach."""
@@ -203,12 +218,12 @@ class _Fit:
         return near
 
 
-def _uniform(field: VoxelField, vertex: NDArray[np.int64]) -> Array:
+def _uniform_position(field: VoxelField, vertex: NDArray[np.int64]) -> Array:
     """World position [3] of a vertex, of an unbounded field as if voxels had one size everywhere."""
     return np.asarray(field.center + (vertex - (np.array(field.resolution) - 1) / 2.0) * field.voxel_size)
 
 
-def _pasted_splats(source: SplatField, content: SourceContent, cage: Cage, field: SplatField) -> SplatField:
+def _extract_splats(source: SplatField, content: SourceContent, cage: Cage, field: SplatField) -> SplatField:
     """The splats in a cage of another scene, those that its faces cut in parts."""
     edited = baked_splats(source, content.edits, preserve_opacity=content.preserve_opacity)
     edited = split_for_edits(edited, EditStack([Edit.delete(cage)]))
@@ -219,7 +234,7 @@ def _pasted_splats(source: SplatField, content: SourceContent, cage: Cage, field
     return replace(found, antialiased=field.antialiased, discs=field.discs)
 
 
-def _with_terms(sh: NDArray[np.float32], terms: int) -> NDArray[np.float32]:
+def _resize_harmonics(sh: NDArray[np.float32], terms: int) -> NDArray[np.float32]:
     """Harmonics [N,terms,3]: cut, or with zeros of higher degrees."""
     out = np.zeros((len(sh), terms, 3), np.float32)
     few = min(terms, sh.shape[1])

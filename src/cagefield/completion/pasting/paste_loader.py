@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import Protocol
 
-from cagefield.completion.pasting.paste_content import SourceContent, pasted
+from cagefield.completion.pasting.paste_content import SourceContent, extract_content
 from cagefield.edits import Edit
 from cagefield.edits.patch import Pasted
 from cagefield.errors import CagefieldError, EditError
@@ -13,14 +13,14 @@ from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.fields.voxel_layers import slices_of
 
-KEPT = 4
+MAX_UNUSED_PASTES = 4
 """Pastes that are kept beside those that were asked for last: undo takes one back."""
 
-MOST_VERTICES = 1 << 29
+MAX_PASTED_VERTICES = 1 << 29
 """Vertices of the grid's slices of all pastes together: 2 GB of their index."""
 
 
-class Library(Protocol):
+class SceneLibrary(Protocol):
     """Where pastes get scenes from."""
 
     def state(self, source: str) -> Hashable:
@@ -30,10 +30,10 @@ class Library(Protocol):
         """The scene of a source. Raises CagefieldError where it cannot be read."""
 
 
-class Pastes:
+class PasteLoader:
     """Gives pastes into one field what they show."""
 
-    def __init__(self, library: Library) -> None:
+    def __init__(self, library: SceneLibrary) -> None:
         self._library = library
         self._kept: dict[Hashable, Pasted] = {}
 
@@ -61,7 +61,7 @@ class Pastes:
         if used and isinstance(field, VoxelField):
             _check_size(used.values(), field)
         others = [(key, shown) for key, shown in self._kept.items() if key not in used]
-        self._kept = dict(others[-KEPT:]) | used
+        self._kept = dict(others[-MAX_UNUSED_PASTES:]) | used
         return found
 
     def _shown(
@@ -71,7 +71,9 @@ class Pastes:
             key = (self._library.state(source), edit.inner, preserve_opacity)
             if key not in self._kept:
                 content = self._library.read(source)
-                self._kept[key] = pasted(content, edit.inner, field, preserve_opacity=preserve_opacity)
+                self._kept[key] = extract_content(
+                    content, edit.inner, field, preserve_opacity=preserve_opacity
+                )
         except EditError as error:
             raise edit.cannot_paste(str(error)) from None
         except CagefieldError as error:
@@ -84,8 +86,8 @@ def _check_size(pastes: Iterable[Pasted], field: VoxelField) -> None:
     _, ny, nz = field.resolution
     ends = [slices_of(each.part) for each in pastes if each.part is not None]
     vertices = sum(high - low for low, high in ends) * ny * nz
-    if vertices > MOST_VERTICES:
+    if vertices > MAX_PASTED_VERTICES:
         raise EditError(
             f"what is pasted takes {vertices / 1e6:.0f} million vertices of this scene's grid, at most"
-            f" {MOST_VERTICES / 1e6:.0f} million are kept; paste less, or the same cage several times"
+            f" {MAX_PASTED_VERTICES / 1e6:.0f} million are kept; paste less, or the same cage several times"
         )

@@ -9,24 +9,28 @@ import numpy as np
 
 from cagefield.typing import Array
 
-HUBER = 3.0
+HUBER_DEVIATIONS = 3.0
 """Standard deviations of noise from which on what is left counts by its size, no longer by its square."""
 
 
-LEAST = 1e-3
+MIN_LOG_DEVIATION = 1e-3
 """Least standard deviation of logs of brightness: a thousandth cannot be seen."""
 
 
-def noise_of(values: Array) -> float:
+def estimate_noise(values: Array) -> float:
     """The standard deviation of values [N] but for those far off, by their median; at least LEAST."""
-    return max(1.4826 * float(np.median(np.abs(values - np.median(values)))), LEAST)
+    return max(1.4826 * float(np.median(np.abs(values - np.median(values)))), MIN_LOG_DEVIATION)
 
 
-def softened(left: Array) -> Array:
+def charbonnier_residuals(left: Array) -> Array:
     """What is left over [N], in standard deviations, so that its squares are the loss."""
-    return np.asarray(np.sign(left) * HUBER * np.sqrt(2.0 * (np.sqrt(1.0 + (left / HUBER) ** 2) - 1.0)))
+    return np.asarray(
+        np.sign(left)
+        * HUBER_DEVIATIONS
+        * np.sqrt(2.0 * (np.sqrt(1.0 + (left / HUBER_DEVIATIONS) ** 2) - 1.0))
+    )
 
 
-def loss(left: Array) -> float:
+def charbonnier_loss(left: Array) -> float:
     """The mean loss of what is left over [N]."""
-    return float((softened(left) ** 2).mean())
+    return float((charbonnier_residuals(left) ** 2).mean())

@@ -13,27 +13,27 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.interpolate import RBFInterpolator
 
-from cagefield.completion.surfaces.grid_block import Block, world_of
-from cagefield.completion.surfaces.support_plane import LEAST, NEAR, Support
+from cagefield.completion.surfaces.grid_block import GridBlock, world_positions
+from cagefield.completion.surfaces.support_plane import MIN_SUPPORT_SURFELS, PLANE_DISTANCE_VOXELS, Support
 from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.typing import Array, Mask
 
-HIGH = 3.0
+MAX_SUPPORT_HEIGHT_VOXELS = 3.0
 """Height over a support, voxels, up to which it is made anew."""
 
-BESIDE = 2
+HOLE_MARGIN_COLUMNS = 2
 """Columns beside those that no camera sees that are filled too."""
 
-GAP = 3
+GAP_HALF_WIDTH_COLUMNS = 3
 """Half the width of a gap amid a support from which on it is one; columns."""
 
-ALONG = 0.8
+MIN_SHADED_COSINE = 0.8
 """Least cosine between a support's normal and those of its surface in deep shade."""
 
-CLOSE = 3.0
+CONTACT_DISTANCE_VOXELS = 3.0
 """Surfaces are hidden by what comes this near to them, voxels."""
 
-KNOTS = 1500
+MAX_SPLINE_KNOTS = 1500
 """Vertices through which the spline goes, at most."""
 
 
@@ -53,12 +53,12 @@ class Footprint:
     height: Array
     changed: Array | None = None
 
-    def points(self, block: Block, columns: Mask | None = None) -> Array:
+    def points(self, block: GridBlock, columns: Mask | None = None) -> Array:
         """World positions [N,3] of some columns [U,V] on the surface, the hole's unless others are given."""
         cells = np.argwhere(self.hole if columns is None else columns)
         uv, height = cells + self.first, self.height[tuple(cells.T)]
         at = self.support.point + uv @ self.support.axes + height[:, None] * self.support.normal
-        return world_of(block.field, at + block.low)
+        return world_positions(block.field, at + block.low)
 
     def without_air(self, air: NDArray[np.bool_]) -> Footprint:
         """The footprint whose hole lacks columns [N] where cameras see that no support goes on."""
@@ -66,7 +66,7 @@ class Footprint:
         gone[tuple(np.argwhere(self.hole)[air].T)] = True
         # Single rays that pass are noise, and so are small gaps amid the support: dark corners are foggy.
         gone = ndimage.binary_opening(ndimage.binary_closing(gone)) & self.hole
-        sure = ndimage.binary_opening(gone, iterations=GAP) | ~(self.hole | self.around)
+        sure = ndimage.binary_opening(gone, iterations=GAP_HALF_WIDTH_COLUMNS) | ~(self.hole | self.around)
         gone = ndimage.binary_propagation(sure, mask=sure | gone) & gone
         return replace(self, hole=self.hole & ~gone)
 
@@ -80,21 +80,24 @@ class Footprint:
         kept[tuple(np.argwhere(self.hole)[known].T)] = True
         kept &= self.surfaced & ~self.stands(np.argwhere(part))
         # What shows through gaps, and right beside the part, is of no use.
-        wide = np.pad(kept | self.around, BESIDE + 1, mode="edge")
-        kept = ndimage.binary_opening(ndimage.binary_closing(wide), iterations=BESIDE)
-        kept = kept[BESIDE + 1 : -BESIDE - 1, BESIDE + 1 : -BESIDE - 1]
-        hole = ndimage.binary_dilation(self.hole & ~kept, iterations=BESIDE) & self.hole
+        wide = np.pad(kept | self.around, HOLE_MARGIN_COLUMNS + 1, mode="edge")
+        kept = ndimage.binary_opening(ndimage.binary_closing(wide), iterations=HOLE_MARGIN_COLUMNS)
+        kept = kept[
+            HOLE_MARGIN_COLUMNS + 1 : -HOLE_MARGIN_COLUMNS - 1,
+            HOLE_MARGIN_COLUMNS + 1 : -HOLE_MARGIN_COLUMNS - 1,
+        ]
+        hole = ndimage.binary_dilation(self.hole & ~kept, iterations=HOLE_MARGIN_COLUMNS) & self.hole
         return replace(self, hole=hole, around=self.around | (self.hole & ~hole))
 
     def holds(self, at: Array) -> NDArray[np.bool_]:
         """Which block coordinates [N,3] lie at the surface of the hole's columns, or near it."""
         u, v, height = self.column(at)
-        return np.asarray((u >= 0) & self.hole[u, v] & (np.abs(height) < HIGH))
+        return np.asarray((u >= 0) & self.hole[u, v] & (np.abs(height) < MAX_SUPPORT_HEIGHT_VOXELS))
 
     def stands(self, at: NDArray[np.int64]) -> Mask:
         """Columns [U,V] that block coordinates [N,3] of a part stand on, or nearly."""
         u, v, height = self.column(at.astype(np.float64))
-        low = (u >= 0) & (height < HIGH + 2.0)
+        low = (u >= 0) & (height < MAX_SUPPORT_HEIGHT_VOXELS + 2.0)
         out = np.zeros(self.hole.shape, bool)
         out[u[low], v[low]] = True
         return out
@@ -109,7 +112,7 @@ class Footprint:
         return np.where(inside, cell[:, 0], -1), cell[:, 1], height
 
 
-def footprint_of(support: Support, part: Mask, close: Array, unsure: Surfels) -> Footprint | None:
+def build_footprint(support: Support, part: Mask, close: Array, unsure: Surfels) -> Footprint | None:
     """The columns under the part, and those of the surfaces close to it, and of those in deep shade.
 
     close: block coordinates [N,3] of the former; unsure: the latter, at block coordinates. The sides of a
@@ -121,11 +124,11 @@ def footprint_of(support: Support, part: Mask, close: Array, unsure: Surfels) ->
     tall = float(np.percentile(above, 98))
     low = where[above < max(4.0, 0.25 * tall)]
     dark = support.local(close)
-    low = np.concatenate([low, dark[0][np.abs(dark[1]) < 2.0 * NEAR]])
+    low = np.concatenate([low, dark[0][np.abs(dark[1]) < 2.0 * PLANE_DISTANCE_VOXELS]])
     if len(low) < 4:
         return None
-    deep, above = support.local(unsure.points[unsure.normals @ support.normal > ALONG])
-    deep = deep[np.abs(above) < 2.0 * NEAR]
+    deep, above = support.local(unsure.points[unsure.normals @ support.normal > MIN_SHADED_COSINE])
+    deep = deep[np.abs(above) < 2.0 * PLANE_DISTANCE_VOXELS]
     every = np.concatenate([uv, low, deep])
     first = np.floor(every.min(axis=0)).astype(np.int64) - 3
     size = np.ceil(every.max(axis=0)).astype(np.int64) + 4 - first
@@ -153,9 +156,9 @@ def footprint_of(support: Support, part: Mask, close: Array, unsure: Surfels) ->
     chance = np.random.default_rng(0)
     near = around[tuple((np.round(uv).astype(np.int64) - first).T)]
     knots = np.flatnonzero(near)
-    if len(knots) < LEAST:
+    if len(knots) < MIN_SUPPORT_SURFELS:
         return None
-    knots = chance.choice(knots, min(KNOTS, len(knots)), replace=False)
+    knots = chance.choice(knots, min(MAX_SPLINE_KNOTS, len(knots)), replace=False)
     spline = RBFInterpolator(uv[knots], own[knots], neighbors=64, smoothing=4.0)
     cells = np.argwhere(hole | around)
     height = np.zeros(size)

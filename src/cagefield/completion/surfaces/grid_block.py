@@ -21,21 +21,21 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Float32, Mask
 
-AT_ONCE = 1 << 18
+VERTICES_PER_BATCH = 1 << 18
 """Vertices that are taken through the edits at a time."""
 
-NOTICED = 0.01
+MIN_COEFFICIENT_DIFFERENCE = 0.01
 """A difference between colour coefficients that shows: a hundredth of the range, or less."""
 
-SOLID = 0.3
+SOLID_OPTICAL_DEPTH = 0.3
 """Optical depth per voxel from which on a vertex counts as solid."""
 
-FOG = 0.12
+OCCUPIED_OPTICAL_DEPTH = 0.12
 """The same of a vertex that is more than air."""
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class GridBlock:
     """Vertices [X,Y,Z] of a field's grid: density per world unit, and colours where there is density.
 
     slot [X,Y,Z] is the row of `sh` [M,K,3], -1 where a vertex has no colour. In a block of a `stride` above 1
@@ -68,7 +68,7 @@ class Block:
     @property
     def solid(self) -> Mask:
         """[X,Y,Z], True where the vertex is opaque."""
-        return np.asarray(self.depth > SOLID)
+        return np.asarray(self.depth > SOLID_OPTICAL_DEPTH)
 
     @cached_property
     def matter(self) -> Mask:
@@ -78,7 +78,9 @@ class Block:
         """
         solid = np.pad(self.solid, 2)
         closed = ndimage.binary_closing(solid, ndimage.generate_binary_structure(3, 2))[2:-2, 2:-2, 2:-2]
-        return np.asarray(ndimage.binary_fill_holes(self.solid | (closed & (self.depth > FOG))))
+        return np.asarray(
+            ndimage.binary_fill_holes(self.solid | (closed & (self.depth > OCCUPIED_OPTICAL_DEPTH)))
+        )
 
     @cached_property
     def surface(self) -> Mask:
@@ -99,9 +101,9 @@ class Block:
     def positions(self, where: Mask) -> Array:
         """World positions [N,3] of the vertices of a mask [X,Y,Z]."""
         middle = 0.5 * (self.stride - 1)
-        return world_of(self.field, self.stride * np.argwhere(where) + self.low + middle)
+        return world_positions(self.field, self.stride * np.argwhere(where) + self.low + middle)
 
-    def lookup(self, values: AnyField, points: Array, outside: float = 0.0) -> NDArray[np.float64]:
+    def lookup(self, values: GridValues, points: Array, outside: float = 0.0) -> NDArray[np.float64]:
         """Values [X,Y,Z] of the block interpolated at world positions [N,3]."""
         at = self.coordinates(points).T
         return np.asarray(ndimage.map_coordinates(values, at, np.float64, order=1, cval=outside))
@@ -117,7 +119,7 @@ class Block:
         x, y, z = (self.stride * float(edge) for edge in self.field.voxel_size)
         return x, y, z
 
-    def pooled(self, stride: int) -> Block:
+    def pooled(self, stride: int) -> GridBlock:
         """A block of cells of so many vertices an axis, each as dense as its densest; without colours."""
         if stride == 1:
             return self
@@ -128,7 +130,7 @@ class Block:
         slot = np.minimum(known.reshape(x, stride, y, stride, z, stride).max(axis=(1, 3, 5)), 0)
         return replace(self, density=density, slot=slot, sh=self.sh[:1], stride=stride)
 
-    def reaching(self, box: Array) -> Block:
+    def reaching(self, box: Array) -> GridBlock:
         """The block grown by empty vertices to hold a world-space box [2,3], also beyond the field's grid."""
         if self.field.contracted:
             return self
@@ -143,19 +145,19 @@ class Block:
             slot=np.pad(self.slot, padding, constant_values=-1),
         )
 
-    def around(self, changed: Mask, region: Cage) -> tuple[Cage, Block]:
+    def around(self, changed: Mask, region: Cage) -> tuple[Cage, GridBlock]:
         """(the part of a region that shows the vertices of a mask [X,Y,Z], the block cropped to it)."""
         at, field = np.argwhere(changed), self.field
         if not len(at):
             return region, self
         first, last = at.min(axis=0), at.max(axis=0)
         # A vertex shows in the cells around it, which need their own vertices.
-        low, high = world_of(field, np.stack([first - 1, last + 1]) + self.low)
+        low, high = world_positions(field, np.stack([first - 1, last + 1]) + self.low)
         if field.contracted and np.abs((np.stack([low, high]) - field.center) / field.half_size).max() > 1.0:
             return region, self
         return Cage.box(0.5 * (low + high), high - low), self.cropped(first - 2, last + 2)
 
-    def with_density(self, where: Mask, density: Float32, *, slots: bool = False) -> Block:
+    def with_density(self, where: Mask, density: Float32, *, slots: bool = False) -> GridBlock:
         """The block with the densities [N] at the vertices of a mask; those without colour become grey.
 
         Empty ones have no colour unless they get `slots`: beside a surface it shows.
@@ -168,7 +170,7 @@ class Block:
         sh = np.concatenate([self.sh, np.zeros((int(fresh.sum()), *self.sh.shape[1:]), np.float32)])
         return replace(self, density=values, slot=slot, sh=sh)
 
-    def with_colours(self, where: Mask, rgb: Array) -> Block:
+    def with_colours(self, where: Mask, rgb: Array) -> GridBlock:
         """The block with colours [N,3], the same in all directions, at the vertices of a mask with slots."""
         sh = self.sh.copy()
         rows = self.slot[where]
@@ -176,7 +178,7 @@ class Block:
         sh[rows, 0] = (rgb - 0.5) / C0
         return replace(self, sh=sh)
 
-    def relit(self, where: Mask, ratio: Array) -> Block:
+    def relit(self, where: Mask, ratio: Array) -> GridBlock:
         """The block with the colours at the vertices of a mask multiplied by ratios [N]."""
         sh = self.sh.copy()
         rows = self.slot[where]
@@ -187,13 +189,13 @@ class Block:
         """Colours [N,3], the mean over directions, at the vertices of a mask with slots."""
         return np.asarray(0.5 + C0 * self.sh[self.slot[where], 0], np.float64)
 
-    def cropped(self, first: NDArray[np.int64], last: NDArray[np.int64]) -> Block:
+    def cropped(self, first: NDArray[np.int64], last: NDArray[np.int64]) -> GridBlock:
         """The vertices from `first` to `last` [3], both of them included, or as far as the block goes."""
         first, last = np.maximum(first, 0), np.minimum(last, np.array(self.shape) - 1)
         part = tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))
         return replace(self, low=self.low + first, density=self.density[part], slot=self.slot[part])
 
-    def differs(self, other: Block, noticed: float = NOTICED) -> Mask:
+    def differs(self, other: GridBlock, noticed: float = MIN_COEFFICIENT_DIFFERENCE) -> Mask:
         """Vertices [X,Y,Z] where it has another density than a block of the same place, or other colours."""
         changed = self.density != other.density
         both = (self.slot >= 0) & (other.slot >= 0)
@@ -213,10 +215,12 @@ class Block:
         return VoxelField(field.bounds, field.resolution, self.vertices[kept], density, sh, field.contracted)
 
 
-AnyField = NDArray[np.floating] | NDArray[np.bool_]
+GridValues = NDArray[np.floating] | NDArray[np.bool_]
 
 
-def block_of(field: VoxelField, below: EditStack, box: Array, *, preserve_opacity: bool = True) -> Block:
+def extract_block(
+    field: VoxelField, below: EditStack, box: Array, *, preserve_opacity: bool = True
+) -> GridBlock:
     """The block that holds a world-space box [2,3], as edits make the field.
 
     Where these leave the field alone its vertices are taken as they are. Where they move it, density and
@@ -230,12 +234,17 @@ def block_of(field: VoxelField, below: EditStack, box: Array, *, preserve_opacit
     high = np.minimum(np.ceil(g.max(axis=0)).astype(np.int64) + 1, last)
     # Normals need three vertices.
     shape = np.minimum(np.maximum(high - low + 1, 3), last - low + 1)
-    block = _stored(field, low, shape)
+    block = _extract_stored(field, low, shape)
     if not below.active:
         return block
     parts = [
-        _changed(block, below, np.arange(first, min(first + AT_ONCE, block.density.size)), preserve_opacity)
-        for first in range(0, block.density.size, AT_ONCE)
+        _sample_changed(
+            block,
+            below,
+            np.arange(first, min(first + VERTICES_PER_BATCH, block.density.size)),
+            preserve_opacity,
+        )
+        for first in range(0, block.density.size, VERTICES_PER_BATCH)
     ]
     rows, raw, sh = (np.concatenate(column) for column in zip(*parts, strict=True))
     # Empty vertices beside a surface keep their colours, and what makes it sharp: densities below zero.
@@ -246,7 +255,7 @@ def block_of(field: VoxelField, below: EditStack, box: Array, *, preserve_opacit
     return replace(block, density=density, slot=slot, sh=np.concatenate([block.sh, sh[stored]]))
 
 
-def world_of(field: VoxelField, g: AnyField | NDArray[np.int64]) -> Array:
+def world_positions(field: VoxelField, g: GridValues | NDArray[np.int64]) -> Array:
     """World positions [N,3] of grid coordinates [N,3]."""
     lower, upper = field.grid_bounds
     points = lower + np.asarray(g, np.float64) / (np.array(field.resolution) - 1) * (upper - lower)
@@ -255,7 +264,7 @@ def world_of(field: VoxelField, g: AnyField | NDArray[np.int64]) -> Array:
     return np.asarray(field.center + uncontract(points) * field.half_size)
 
 
-def _stored(field: VoxelField, low: NDArray[np.int64], shape: NDArray[np.int64]) -> Block:
+def _extract_stored(field: VoxelField, low: NDArray[np.int64], shape: NDArray[np.int64]) -> GridBlock:
     """The block of the field itself."""
     _, ny, nz = field.resolution
     rows = slice(*np.searchsorted(field.vertices, [low[0] * ny * nz, (low[0] + shape[0]) * ny * nz]))
@@ -266,14 +275,14 @@ def _stored(field: VoxelField, low: NDArray[np.int64], shape: NDArray[np.int64])
     density, slot = np.zeros(shape, np.float32), np.full(shape, -1, np.int64)
     density[place] = field.density[rows][inside]
     slot[place] = np.arange(int(inside.sum()))
-    return Block(field, low, density, slot, field.sh[rows][inside])
+    return GridBlock(field, low, density, slot, field.sh[rows][inside])
 
 
-def _changed(
-    block: Block, below: EditStack, rows: NDArray[np.int64], preserve_opacity: bool
+def _sample_changed(
+    block: GridBlock, below: EditStack, rows: NDArray[np.int64], preserve_opacity: bool
 ) -> tuple[NDArray[np.int64], Float32, Float32]:
     """(rows [M], density [M], sh [M,K,3]) of those of some vertices (flat indices) that the edits change."""
-    points = world_of(block.field, np.stack(np.unravel_index(rows, block.shape), axis=1) + block.low)
+    points = world_positions(block.field, np.stack(np.unravel_index(rows, block.shape), axis=1) + block.low)
     near = np.zeros(len(rows), bool)
     for box in below.boxes:
         near |= ((points >= box[0]) & (points <= box[1])).all(axis=1)
@@ -282,11 +291,11 @@ def _changed(
     changed = (mapped.points != points).any(axis=1) | (mapped.layer != 0)
     sources = (block.field, *below.layers)
     jacobian = mapped.jacobian[changed]
-    raw, sh = _read(sources, mapped.layer[changed], mapped.points[changed], jacobian)
-    return rows[changed], raw * _stretch(jacobian) if preserve_opacity else raw, sh
+    raw, sh = _sample_layers(sources, mapped.layer[changed], mapped.points[changed], jacobian)
+    return rows[changed], raw * _mean_stretch(jacobian) if preserve_opacity else raw, sh
 
 
-def sampled(
+def sample_edited_field(
     field: VoxelField,
     below: EditStack,
     points: Array,
@@ -301,11 +310,11 @@ def sampled(
     """
     mapped = below.to_canonical(points)
     jacobian = mapped.jacobian if turn is None else mapped.jacobian @ np.linalg.inv(turn)
-    raw, sh = _read((field, *below.layers), mapped.layer, mapped.points, jacobian)
-    return raw * _stretch(jacobian) if preserve_opacity else raw, sh
+    raw, sh = _sample_layers((field, *below.layers), mapped.layer, mapped.points, jacobian)
+    return raw * _mean_stretch(jacobian) if preserve_opacity else raw, sh
 
 
-def _read(
+def _sample_layers(
     sources: Sequence[VoxelField], layer: NDArray[np.int64], points: Array, jacobian: Array
 ) -> tuple[Float32, Float32]:
     """(density [N], sh [N,K,3]) at canonical points of the sources that `layer` [N] says, colours turned."""
@@ -314,12 +323,12 @@ def _read(
     for number, source in enumerate(sources):
         here = np.flatnonzero(layer == number)
         if len(here):
-            density[here], colours = interpolated(source, points[here])
-            sh[here] = rotated_sh(colours, _turns(jacobian[here]))
+            density[here], colours = interpolate_field(source, points[here])
+            sh[here] = rotated_sh(colours, _color_rotations(jacobian[here]))
     return density, sh
 
 
-def interpolated(field: VoxelField, points: Array) -> tuple[Float32, Float32]:
+def interpolate_field(field: VoxelField, points: Array) -> tuple[Float32, Float32]:
     """(density [N] before its clamp, sh [N,K,3]) of a field at canonical points; 0 outside of its grid."""
     n = np.array(field.resolution)
     g = field.grid_coordinates(points)
@@ -336,12 +345,12 @@ def interpolated(field: VoxelField, points: Array) -> tuple[Float32, Float32]:
     return raw.astype(np.float32), sh.astype(np.float32)
 
 
-def _stretch(jacobian: Array) -> Float32:
+def _mean_stretch(jacobian: Array) -> Float32:
     """|det J|^(1/3) [N]: |J d|, in the mean over directions."""
     return np.cbrt(np.abs(np.linalg.det(jacobian))).astype(np.float32)
 
 
-def _turns(jacobian: Array) -> Array:
+def _color_rotations(jacobian: Array) -> Array:
     """Rotations [N,3,3] of colours from canonical to deformed space: of J's polar decomposition, inverted."""
     u, _, v = np.linalg.svd(jacobian)
     return np.asarray(np.swapaxes(u @ v, 1, 2))

@@ -7,28 +7,32 @@ import numpy as np
 from cagefield.edits import Edit
 from cagefield.typing import Array
 
-RIM = 6.0
+SUPPORT_DISTANCE_VOXELS = 6.0
 """A support is looked for within this distance of V^c, voxels, or within half of its size."""
 
 
-FALL = 2.0
+SHADOW_LENGTH_DIAGONALS = 2.0
 """Cast shadows are followed so far, diagonals of what casts them."""
 
-EVERYWHERE = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0], [0, 0, -1.0]])
+ANY_SHADOW_DIRECTIONS = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0], [0, 0, -1.0]])
 """Where shadows may fall of a light that is not known."""
 
 
-def swept(box: Array, falls: Array) -> Array:
+def extrude_box(box: Array, falls: Array) -> Array:
     """A box [2,3] grown by where the shadows of what it holds may fall, directions [K,3]."""
-    ways = FALL * float(np.linalg.norm(box[1] - box[0])) * np.concatenate([np.zeros((1, 3)), falls])
+    ways = (
+        SHADOW_LENGTH_DIAGONALS
+        * float(np.linalg.norm(box[1] - box[0]))
+        * np.concatenate([np.zeros((1, 3)), falls])
+    )
     return np.stack([box[0] + ways.min(axis=0), box[1] + ways.max(axis=0)])
 
 
-NOWHERE = np.zeros((0, 3))
+NO_SHADOW_DIRECTIONS = np.zeros((0, 3))
 
 
 def patch_box(
-    edit: Edit, voxel: float, reach: float, *, settled: bool = True, falls: Array = NOWHERE
+    edit: Edit, voxel: float, reach: float, *, settled: bool = True, falls: Array = NO_SHADOW_DIRECTIONS
 ) -> Array:
     """The box [2,3] (min, max) that a discrete edit's patch is made from; the patch lies in it. World units.
 
@@ -37,11 +41,11 @@ def patch_box(
     shadows go along that fall in directions [K,3], `falls`.
     """
     box = edit.inner.aabb if edit.source is None else edit.deformed.aabb
-    box = swept(box, falls)
-    margin = max(RIM * voxel, 0.5 * float(np.median(box[1] - box[0])))
+    box = extrude_box(box, falls)
+    margin = max(SUPPORT_DISTANCE_VOXELS * voxel, 0.5 * float(np.median(box[1] - box[0])))
     if reach > 0.0:
-        margin = max(margin, 1.5 * reach + RIM * voxel)
+        margin = max(margin, 1.5 * reach + SUPPORT_DISTANCE_VOXELS * voxel)
     if settled and (reach > 0.0 or len(falls) or (edit.feather > 0.0 and edit.source is None)):
-        moved = swept(edit.deformed.aabb, falls)
+        moved = extrude_box(edit.deformed.aabb, falls)
         box = np.stack([np.minimum(box[0], moved[0]), np.maximum(box[1], moved[1])])
     return np.asarray(box + margin * np.array([[-1.0], [1.0]]))

@@ -15,24 +15,42 @@ from scipy.spatial import cKDTree
 from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.typing import Array
 
-PLANES, TRIALS = 4, 120
-"""Planes that are looked for, and how often each."""
+MAX_PLANES = 4
+"""Maximum number of planes."""
 
-SOME = 4000
+TRIALS_PER_PLANE = 120
+"""RANSAC hypotheses per plane."""
+
+MAX_SURFELS_PER_TRIAL = 4000
 """Surface elements that are counted in a trial, at most."""
 
-NEAR, ALONG = 1.5, 0.8
-"""A surface element supports a plane within this distance, voxels, and from this cosine of normals on."""
+INLIER_DISTANCE_VOXELS = 1.5
+"""Maximum distance of an inlier from its plane, voxels."""
 
-SHARE, LEAST = 0.08, 40
-"""Share of all surface elements that support a plane, and their number, at least."""
+MIN_INLIER_COSINE = 0.8
+"""Minimum cosine between the normals of an inlier and of its plane."""
 
-ON, FACING = 3.0, 0.6
-"""Those within this distance, voxels, and from this cosine of normals on, are put on the plane."""
+MIN_INLIER_SHARE = 0.08
+"""Minimum number of surfels on a plane, as a share of all surfels."""
 
-REACH, NEIGHBOURS, AMID = 8.0, 24, 0.5
-"""A plane is around what has so many of its elements within so many voxels, whose mean is nearer than this
-share of their mean distance."""
+MIN_INLIERS = 40
+"""Minimum number of surfels on a plane."""
+
+SNAP_DISTANCE_VOXELS = 3.0
+"""Maximum distance from its plane of a surfel that is moved onto the plane, voxels."""
+
+MIN_SNAP_COSINE = 0.6
+"""Minimum cosine between the normals of such a surfel and of its plane."""
+
+NEIGHBOR_RADIUS_VOXELS = 8.0
+"""Radius in which a surfel's neighbors on the plane are searched, voxels."""
+
+MAX_NEIGHBORS = 24
+"""Maximum number of such neighbors."""
+
+MAX_CENTROID_OFFSET_SHARE = 0.5
+"""A surfel lies inside a plane's extent if the centroid of its neighbors is nearer than this share of
+their mean distance."""
 
 
 def flattened(
@@ -46,9 +64,9 @@ def flattened(
     points, normals = surface.points.copy(), surface.normals.copy()
     left = np.ones(len(points), bool)
     chance = np.random.default_rng(seed)
-    for _ in range(PLANES):
+    for _ in range(MAX_PLANES):
         rows = np.flatnonzero(left)
-        if len(rows) < LEAST:
+        if len(rows) < MIN_INLIERS:
             break
         found = _plane(points[rows], normals[rows], voxel, chance)
         if found is None:
@@ -56,12 +74,14 @@ def flattened(
         centre, normal = found
         height = (points[rows] - centre) @ normal
         facing = normals[rows] @ normal
-        on = (np.abs(height) < ON * voxel) & (facing > FACING)
+        on = (np.abs(height) < SNAP_DISTANCE_VOXELS * voxel) & (facing > MIN_SNAP_COSINE)
         if edges:
-            sure = on & (np.abs(height) < NEAR * voxel) & (facing > ALONG)
-            on = sure | _amid(points[rows] - height[:, None] * normal, on & ~sure, sure, REACH * voxel)
+            sure = on & (np.abs(height) < INLIER_DISTANCE_VOXELS * voxel) & (facing > MIN_INLIER_COSINE)
+            on = sure | _amid(
+                points[rows] - height[:, None] * normal, on & ~sure, sure, NEIGHBOR_RADIUS_VOXELS * voxel
+            )
         on = rows[on]
-        if len(on) < max(LEAST, SHARE * len(points)):
+        if len(on) < max(MIN_INLIERS, MIN_INLIER_SHARE * len(points)):
             break
         points[on] -= ((points[on] - centre) @ normal)[:, None] * normal
         normals[on] = normal
@@ -78,13 +98,15 @@ def _amid(
     if not len(at) or not sure.any():
         return out
     found, rows = cKDTree(points[sure]).query(
-        points[at], k=[*range(1, NEIGHBOURS + 1)], distance_upper_bound=reach, workers=-1
+        points[at], k=[*range(1, MAX_NEIGHBORS + 1)], distance_upper_bound=reach, workers=-1
     )
     near = np.isfinite(found)
     count = np.maximum(near.sum(axis=1), 1)
     away = np.where(near[..., None], points[sure][np.where(near, rows, 0)] - points[at, None], 0.0)
     aside = np.linalg.norm(away.sum(axis=1), axis=1) / count
-    out[at] = near[:, 0] & (aside < AMID * np.where(near, found, 0.0).sum(axis=1) / count)
+    out[at] = near[:, 0] & (
+        aside < MAX_CENTROID_OFFSET_SHARE * np.where(near, found, 0.0).sum(axis=1) / count
+    )
     return out
 
 
@@ -92,15 +114,19 @@ def _plane(
     points: Array, normals: Array, voxel: float, chance: np.random.Generator
 ) -> tuple[Array, Array] | None:
     """(a point [3], the normal [3]) of the plane that most surface elements support, None where few do."""
-    some = chance.choice(len(points), min(SOME, len(points)), replace=False)
-    tried = chance.choice(len(points), min(TRIALS, len(points)), replace=False)
+    some = chance.choice(len(points), min(MAX_SURFELS_PER_TRIAL, len(points)), replace=False)
+    tried = chance.choice(len(points), min(TRIALS_PER_PLANE, len(points)), replace=False)
     height = points[some] @ normals[tried].T - (points[tried] * normals[tried]).sum(axis=1)
-    supports = (np.abs(height) < NEAR * voxel) & (normals[some] @ normals[tried].T > ALONG)
+    supports = (np.abs(height) < INLIER_DISTANCE_VOXELS * voxel) & (
+        normals[some] @ normals[tried].T > MIN_INLIER_COSINE
+    )
     best = tried[int(np.argmax(supports.sum(axis=0)))]
     centre, normal = points[best], normals[best]
     for _ in range(3):
-        mine = (np.abs((points - centre) @ normal) < NEAR * voxel) & (normals @ normal > ALONG)
-        if mine.sum() < LEAST:
+        mine = (np.abs((points - centre) @ normal) < INLIER_DISTANCE_VOXELS * voxel) & (
+            normals @ normal > MIN_INLIER_COSINE
+        )
+        if mine.sum() < MIN_INLIERS:
             return None
         centre = points[mine].mean(axis=0)
         across = np.linalg.eigh(np.cov((points[mine] - centre).T))[1][:, 0]

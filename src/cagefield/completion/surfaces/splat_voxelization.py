@@ -12,46 +12,46 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.typing import Array, Mask
 
-FINEST = 128
+MAX_BOUNDS_VOXELS = 128
 """Voxels along the longest edge of the bounds of splats of which light is found out about."""
 
-WIDEST = 0.6
+MIN_DEVIATION_VOXELS = 0.6
 """Least standard deviation of a splat, voxels: a thinner one would be missed between vertices."""
 
-REACH = 2.5
+SPLAT_RADIUS_DEVIATIONS = 2.5
 """Standard deviations around its mean at which a splat is asked for."""
 
-FAINT = 0.005
+MIN_OPTICAL_DEPTH = 0.005
 """Optical depth per voxel that is left out."""
 
-VERTICES = (40, 112)
+GRID_VERTEX_RANGE = (40, 112)
 """Vertices along the longest edge of a grid that splats are worked out on, at least and at most."""
 
 
-def coarsest_voxel(box: Array) -> float:
+def max_voxel_size(box: Array) -> float:
     """The largest edge that a voxel has for a world-space box [2,3]."""
-    return float((box[1] - box[0]).max()) / VERTICES[0]
+    return float((box[1] - box[0]).max()) / GRID_VERTEX_RANGE[0]
 
 
-def voxel_for(splats: SplatField, box: Array) -> float:
+def choose_voxel_size(splats: SplatField, box: Array) -> float:
     """The edge of a voxel, world units, that shows what splats in a world-space box [2,3] show."""
     inside = ((splats.means >= box[0]) & (splats.means <= box[1])).all(axis=1)
-    most = coarsest_voxel(box)
-    least = most * VERTICES[0] / VERTICES[1]
+    most = max_voxel_size(box)
+    least = most * GRID_VERTEX_RANGE[0] / GRID_VERTEX_RANGE[1]
     if not inside.any():
         return most
     return float(np.clip(splats.take(inside).sample_spacing, least, most))
 
 
-def voxelised(splats: SplatField, box: Array, voxel: float) -> VoxelField:
+def voxelize_splats(splats: SplatField, box: Array, voxel: float) -> VoxelField:
     """What splats are in a world-space box [2,3]: densities, and colours that are the same all around.
 
     `voxel` is a voxel's edge, world units; the box grows to a whole number of them.
     """
     count = np.maximum(np.ceil((box[1] - box[0]) / voxel).astype(np.int64), 2) + 1
     bounds = box.mean(axis=0) + 0.5 * voxel * (count - 1) * np.array([[-1.0], [1.0]])
-    near = _wide(splats, bounds, voxel)
-    asked = _covered(near, bounds[0], voxel, count)
+    near = _widen_splats(splats, bounds, voxel)
+    asked = _covered_vertices(near, bounds[0], voxel, count)
     points = (bounds[0] + voxel * np.argwhere(asked)).astype(np.float32)
     vertices = np.flatnonzero(asked)
     density, sh = np.zeros(0, np.float32), np.zeros((0, 1, 3), np.float32)
@@ -60,7 +60,7 @@ def voxelised(splats: SplatField, box: Array, voxel: float) -> VoxelField:
             near.means, near.log_scales, near.quaternions, near.opacities, near.sh[:, :1]
         )
         density = mixture.grid_sigma(points)
-        kept = density * voxel > FAINT
+        kept = density * voxel > MIN_OPTICAL_DEPTH
         density, vertices, points = density[kept], vertices[kept], points[kept]
         up = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (len(points), 1, 1))
         sh = ((mixture.along(points, up)[1] - 0.5) / C0).astype(np.float32)
@@ -69,16 +69,16 @@ def voxelised(splats: SplatField, box: Array, voxel: float) -> VoxelField:
     return VoxelField(bounds, (int(count[0]), int(count[1]), int(count[2])), vertices, density, sh)
 
 
-def voxelised_whole(splats: SplatField) -> VoxelField:
+def voxelize_bounds(splats: SplatField) -> VoxelField:
     """What splats are in their bounds, as coarsely as light is found out about."""
     edge = float((splats.bounds[1] - splats.bounds[0]).max())
-    return voxelised(splats, splats.bounds, edge / FINEST)
+    return voxelize_splats(splats, splats.bounds, edge / MAX_BOUNDS_VOXELS)
 
 
-def _wide(splats: SplatField, bounds: Array, voxel: float) -> SplatField:
+def _widen_splats(splats: SplatField, bounds: Array, voxel: float) -> SplatField:
     """The splats that reach into a box, none thinner than a vertex can see."""
-    scales = np.maximum(np.exp(splats.log_scales), np.float32(WIDEST * voxel))
-    reach = REACH * scales.max(axis=1, keepdims=True)
+    scales = np.maximum(np.exp(splats.log_scales), np.float32(MIN_DEVIATION_VOXELS * voxel))
+    reach = SPLAT_RADIUS_DEVIATIONS * scales.max(axis=1, keepdims=True)
     seen = (splats.means + reach >= bounds[0]) & (splats.means - reach <= bounds[1])
     rows = np.flatnonzero(seen.all(axis=1) & (splats.opacities > 0.02))
     return SplatField(
@@ -91,10 +91,12 @@ def _wide(splats: SplatField, bounds: Array, voxel: float) -> SplatField:
     )
 
 
-def _covered(splats: SplatField, low: Array, voxel: float, count: NDArray[np.int64]) -> Mask:
+def _covered_vertices(splats: SplatField, low: Array, voxel: float, count: NDArray[np.int64]) -> Mask:
     """Vertices [X,Y,Z] of a grid that the boxes of splats cover."""
     axes = rotation_matrices(splats.quaternions.astype(np.float64))
-    half = REACH * np.sqrt(np.einsum("nij,nj->ni", axes**2, np.exp(2.0 * splats.log_scales)))
+    half = SPLAT_RADIUS_DEVIATIONS * np.sqrt(
+        np.einsum("nij,nj->ni", axes**2, np.exp(2.0 * splats.log_scales))
+    )
     first = np.clip(np.ceil((splats.means - half - low) / voxel).astype(np.int64), 0, count)
     end = np.clip(np.floor((splats.means + half - low) / voxel).astype(np.int64) + 1, 0, count)
     # Boxes as differences at their corners, whose sums along the axes count how many cover a vertex.

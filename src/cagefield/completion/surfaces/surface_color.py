@@ -12,41 +12,57 @@ from itertools import product
 
 import numpy as np
 
-from cagefield.completion.surfaces.grid_block import Block
-from cagefield.completion.surfaces.surfels import Surfels, surfels_of
+from cagefield.completion.surfaces.grid_block import GridBlock
+from cagefield.completion.surfaces.surfels import Surfels, extract_surfels
 from cagefield.typing import Array, Float32, Mask
 
-OUT, IN, STEP = 2.0, 5.0, 0.5
-"""Rays go from so far outside of a surface to so far beneath it, in such steps; voxels."""
+RAY_START_VOXELS = 2.0
+"""Distance in front of the surface at which a ray begins, voxels."""
 
-FROM, TO = 0.2, 0.6
-"""Light that grows by more (log) than the first brings noise out; from the second on all of it."""
+RAY_END_VOXELS = 5.0
+"""Depth beneath the surface at which a ray ends, voxels."""
 
-NEAREST, DEEP = 4, 8.0
-"""Surface elements that a vertex's colour is the mean of, and how far beneath them it may be; voxels."""
+RAY_STEP_VOXELS = 0.5
+"""Step of a ray, voxels."""
 
-MARGIN = 12
+MIN_DENOISED_LOG_GAIN = 0.2
+"""Gain of light (log) above which colors are denoised."""
+
+FULLY_DENOISED_LOG_GAIN = 0.6
+"""Gain of light (log) above which the denoised color replaces the stored one."""
+
+COLOR_NEIGHBORS = 4
+"""Number of surfels whose mean color a vertex gets."""
+
+MAX_COLOR_DEPTH_VOXELS = 8.0
+"""Maximum distance of a denoised vertex from its surfels, voxels."""
+
+CROP_MARGIN_VERTICES = 12
 """Vertices around those whose colours change that surfaces are looked for in: DEEP, and a normal's own."""
 
 
-def steadied(block: Block, where: Mask, log: Array) -> Block:
+def denoise_colors(block: GridBlock, where: Mask, log: Array) -> GridBlock:
     """The block, without noise at vertices `where` [X,Y,Z] whose light is to be multiplied by e^log [N]."""
-    share = np.clip((log - FROM) / (TO - FROM), 0.0, 1.0)
+    share = np.clip(
+        (log - MIN_DENOISED_LOG_GAIN) / (FULLY_DENOISED_LOG_GAIN - MIN_DENOISED_LOG_GAIN), 0.0, 1.0
+    )
     rows = np.flatnonzero(share > 0.0)
     if not len(rows):
         return block
     at = np.argwhere(where)[rows]
-    near = block.cropped(at.min(axis=0) - MARGIN, at.max(axis=0) + MARGIN)
-    surface = surfels_of(near)
+    near = block.cropped(at.min(axis=0) - CROP_MARGIN_VERTICES, at.max(axis=0) + CROP_MARGIN_VERTICES)
+    surface = extract_surfels(near)
     if not len(surface.points):
         return block
     voxel = max(block.spacing)
-    found, nearest = surface.nearest(block.positions(where)[rows], NEAREST, DEEP * voxel)
+    found, nearest = surface.nearest(
+        block.positions(where)[rows], COLOR_NEIGHBORS, MAX_COLOR_DEPTH_VOXELS * voxel
+    )
     over = np.isfinite(found[:, 0])
     rows, found, nearest = rows[over], found[over], nearest[over]
     nearest = np.where(np.isfinite(found), nearest, nearest[:, :1])
     used, place = np.unique(nearest, return_inverse=True)
-    colours, opacity = shown(near, surface.take(used))
+    colours, opacity = colors_along_normals(near, surface.take(used))
     place = place.reshape(nearest.shape)
     weight = np.exp(-0.5 * (found**2 - found[:, :1] ** 2) / voxel**2) * opacity[place]
     total = weight.sum(axis=1)
@@ -57,7 +73,7 @@ def steadied(block: Block, where: Mask, log: Array) -> Block:
     return replace(block, sh=sh)
 
 
-def shown(block: Block, surface: Surfels) -> tuple[Float32, Float32]:
+def colors_along_normals(block: GridBlock, surface: Surfels) -> tuple[Float32, Float32]:
     """(coefficients [N,K,3], opacity [N]) of what shows of surface elements [N] along their normals."""
     at, size = block.coordinates(surface.points), np.array(block.shape)
     along = surface.normals / np.array(block.spacing)
@@ -65,7 +81,7 @@ def shown(block: Block, surface: Surfels) -> tuple[Float32, Float32]:
     flat = block.sh.reshape(len(block.sh), -1)
     colours = np.zeros((len(at), flat.shape[1]), np.float32)
     left = np.ones(len(at), np.float32)
-    for depth in np.arange(-OUT, IN + 0.5 * STEP, STEP):
+    for depth in np.arange(-RAY_START_VOXELS, RAY_END_VOXELS + 0.5 * RAY_STEP_VOXELS, RAY_STEP_VOXELS):
         point = at - depth * along
         inside = ((point >= 0.0) & (point <= size - 1)).all(axis=1)
         base = np.clip(np.floor(point).astype(np.int64), 0, size - 2)
@@ -76,7 +92,7 @@ def shown(block: Block, surface: Surfels) -> tuple[Float32, Float32]:
             vertex = tuple((base + np.array(corner)).T)
             density += weight * block.density[vertex]
             corners.append((weight, block.slot[vertex]))
-        stopped = 1.0 - np.exp(-STEP * block.field.sample_spacing * np.maximum(density, 0.0))
+        stopped = 1.0 - np.exp(-RAY_STEP_VOXELS * block.field.sample_spacing * np.maximum(density, 0.0))
         share = (left * stopped).astype(np.float32)
         rows = np.flatnonzero(share > 1e-3)
         sample, total = np.zeros((len(rows), flat.shape[1]), np.float32), np.zeros(len(rows), np.float32)
