@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 from dataclasses import replace
+from weakref import ref
 
 import numpy as np
 import pytest
@@ -188,3 +190,13 @@ def test_clusters_are_made_once_and_in_the_order_of_others() -> None:
     none = DeformedSplats(splats.means[:0], splats.covariances[:0], splats.opacities[:0], splats.sh[:0])
     assert project(none, camera(), near=NEAR, clusters=Clusters.of(none), detail=1.0).pairs == 0
     assert splat_lod.LEAST > CLUSTER
+
+
+def test_clusters_do_not_keep_their_splats_in_memory() -> None:
+    """Each state of a drag has splats of its own."""
+    splats = all_kinds(camera().origin)
+    clusters, alive = Clusters.of(splats), ref(splats)
+    assert len(clusters.levels) > 0 and Clusters.of(splats) is clusters
+    del splats
+    gc.collect()
+    assert alive() is None

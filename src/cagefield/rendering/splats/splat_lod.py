@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from weakref import WeakKeyDictionary
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,9 +99,12 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Clusters:
-    """The clusters of some splats: order [N] of the splats, boxes [clusters,BOX]."""
+    """Clusters of living splats: order [N] of the splats, boxes [clusters,BOX].
 
-    splats: DeformedSplats
+    The splats are a weak reference: remembered clusters do not keep them alive.
+    """
+
+    splats: ref[DeformedSplats]
     order: NDArray[np.int32]
     boxes: Float32
 
@@ -116,14 +119,16 @@ class Clusters:
             kernels.boxes(splats.means, splats.covariances, splats.opacities, order, CLUSTER, boxes)
             # Rounding may not make a box smaller.
             boxes[:, 3:7] += 1e-6 * (np.abs(boxes[:, :3]).max(axis=1, keepdims=True) + boxes[:, 3:7])
-            found = _known[splats] = cls(splats, order, boxes)
+            found = _known[splats] = cls(ref(splats), order, boxes)
         return found
 
     @cached_property
     def levels(self) -> tuple[Level, ...]:
         """Representatives, finest first; made on first use."""
         levels: list[Level] = []
-        below, order, masses, per_cluster = self.splats, self.order, np.empty((0, 2), np.float32), CLUSTER
+        below = self.splats()
+        assert below is not None, "clusters are used while their splats live"
+        order, masses, per_cluster = self.order, np.empty((0, 2), np.float32), CLUSTER
         for size in GROUPS:
             per_cluster //= size
             level = _merged(below, order, size, masses, len(self.boxes), per_cluster)
