@@ -1,4 +1,4 @@
-"""Memoization of arrays by the identity of their source, as long as the source lives."""
+"""Memoization of values by the identity of their source, as long as the source lives."""
 
 from __future__ import annotations
 
@@ -7,22 +7,26 @@ from functools import wraps
 from typing import TypeVar
 from weakref import WeakKeyDictionary
 
-from cagefield.typing import Float32
+import numpy as np
 
 Source = TypeVar("Source")
+Value = TypeVar("Value")
 
 
-def memoized_by_identity(make: Callable[[Source], Float32]) -> Callable[[Source], Float32]:
-    """`make` with its array remembered for each living source; the array becomes read-only."""
-    known: WeakKeyDictionary[Source, Float32] = WeakKeyDictionary()
+def memoized_by_identity(make: Callable[[Source], Value]) -> Callable[[Source], Value]:
+    """`make` with its value remembered for each living source; an array becomes read-only.
+
+    A value that holds its source keeps the source alive: values hold no source.
+    """
+    known: WeakKeyDictionary[Source, Value] = WeakKeyDictionary()
 
     @wraps(make)
-    def once(source: Source) -> Float32:
-        found = known.get(source)
-        if found is None:
-            found = make(source)
-            found.setflags(write=False)
-            known[source] = found
-        return found
+    def once(source: Source) -> Value:
+        if source not in known:
+            made = make(source)
+            if isinstance(made, np.ndarray):
+                made.setflags(write=False)
+            known[source] = made
+        return known[source]
 
     return once

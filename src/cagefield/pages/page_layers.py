@@ -15,26 +15,23 @@ from __future__ import annotations
 
 import hashlib
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.compute.identity_memo import memoized_by_identity
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.fields.voxel_layers import slices_of
 from cagefield.pages.page_field import BRICK, encode_vertices, quantised_colours, quantised_density
 from cagefield.typing import Float32
 
-_keys: WeakKeyDictionary[VoxelField, str] = WeakKeyDictionary()
-
 AS_FIELD, OTHER, EMPTY = 0, 1, 2
 
 
+@memoized_by_identity
 def layer_key(layer: VoxelField) -> str:
-    """A digest of a layer's content; worked out once in its life."""
-    if layer not in _keys:
-        _keys[layer] = digest(layer.vertices, layer.density, layer.sh)
-    return _keys[layer]
+    """Digest of a layer's content."""
+    return digest(layer.vertices, layer.density, layer.sh)
 
 
 def bricks_of(layer: VoxelField, place: int) -> dict[str, int]:

@@ -26,11 +26,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.compute.identity_memo import memoized_by_identity
 from cagefield.errors import FieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats.morton import morton_codes
@@ -268,11 +268,9 @@ def _decode_level(header: dict[str, Any], parts: dict[str, NDArray[Any]], count:
     return means, log_scales, quaternions, opacities, sh
 
 
+@memoized_by_identity
 def _layout(field: SplatField) -> tuple[NDArray[np.int64], tuple[int, ...]]:
     """(rows [N] in a page's order, where levels end)."""
-    found = _layouts.get(field)
-    if found is not None:
-        return found
     codes = morton_codes(field.means, field.means.min(axis=0), field.means.max(axis=0))
     # What covers most comes first: opacity times the area across the thinnest axis.
     two = np.sort(field.log_scales, axis=1)[:, 1:].sum(axis=1)
@@ -285,11 +283,7 @@ def _layout(field: SplatField) -> tuple[NDArray[np.int64], tuple[int, ...]]:
     parts = [first[start:end] for start, end in zip((0, *ends), ends, strict=False)]
     order = np.concatenate([part[np.argsort(codes[part], kind="stable")] for part in parts])
     order.setflags(write=False)
-    _layouts[field] = order, tuple(ends)
-    return _layouts[field]
-
-
-_layouts: WeakKeyDictionary[SplatField, tuple[NDArray[np.int64], tuple[int, ...]]] = WeakKeyDictionary()
+    return order, tuple(ends)
 
 
 def _rounded(share: AnyArray, bits: int) -> AnyArray:
