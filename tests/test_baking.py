@@ -7,7 +7,7 @@ import pytest
 
 from cagefield.errors import FieldError
 from cagefield.fields import AnalyticField, GaussianBlob, UniformSphere
-from cagefield.fields.baking import bake, grown
+from cagefield.fields.baking import bake, dilate_mask
 from cagefield.fields.contraction import uncontract
 
 TILT = np.array([0.2, -0.1, 0.15])
@@ -129,7 +129,7 @@ def test_growing_reaches_all_26_neighbours() -> None:
     mask[2, 2, 2] = True
     expected = np.zeros((5, 5, 5), bool)
     expected[1:4, 1:4, 1:4] = True
-    np.testing.assert_array_equal(grown(mask), expected)
+    np.testing.assert_array_equal(dilate_mask(mask), expected)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats.splat_files import write_splats
 from cagefield.scene.import_splats import import_splats
 from commands import printed, refused
-from scenes import source_files
+from scenes import files_of
 from splat_scenes import assert_same_splats, ball_of_splats, random_splats
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "splats"
@@ -112,7 +112,7 @@ def test_the_cameras_of_a_data_set_see_the_splats_where_its_reconstruction_has_t
 
 
 def test_what_is_refused(capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path) -> None:
-    before = source_files(tmp_path)
+    before = files_of(tmp_path)
     scene = tmp_path / "scene"
     assert "are for NeRFs" in refused(capsys, "import", file, "-o", scene, "--fov-deg", 50)
     assert "invalid choice 'sideways'" in refused(capsys, "import", file, "-o", scene, "--up", "sideways")
@@ -121,7 +121,7 @@ def test_what_is_refused(capsys: pytest.CaptureFixture[str], file: Path, tmp_pat
     (tmp_path / "cut.ply").write_bytes(file.read_bytes()[:-500])
     assert "it is truncated" in refused(capsys, "import", tmp_path / "cut.ply", "-o", scene)
     (tmp_path / "cut.ply").unlink()
-    assert source_files(tmp_path) == before
+    assert files_of(tmp_path) == before
     printed(capsys, "import", file, "-o", scene)
     assert "exists already" in refused(capsys, "import", file, "-o", scene)
 

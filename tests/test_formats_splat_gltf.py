@@ -72,12 +72,12 @@ def test_linear_light_becomes_srgb(tmp_path: Path) -> None:
         warnings.simplefilter("error")
         assert_same_splats(read_splats(tmp_path / "a.glb"), field, atol=1e-6)
         assert_same_splats(read_splats(in_space(tmp_path / "a.glb", None)), field, atol=1e-6)
-    with pytest.warns(UserWarning, match="its colours are linear light; they become sRGB splat by splat"):
+    with pytest.warns(UserWarning, match="its colors are linear light; they become sRGB splat by splat"):
         read = read_splats(in_space(tmp_path / "a.glb", "lin_rec709_display"))
     linear = np.maximum(0.5 + C0 * field.sh[:, 0].astype(float), 0.0)
     np.testing.assert_allclose(0.5 + C0 * read.sh[:, 0], encode_srgb(linear), atol=1e-6)
     assert_same_splats(replace(read, sh=field.sh), field, atol=1e-6)
-    with pytest.warns(UserWarning, match="its colour space 'acescg' is not known and taken as srgb_rec709"):
+    with pytest.warns(UserWarning, match="its color space 'acescg' is not known and taken as srgb_rec709"):
         assert_same_splats(read_splats(in_space(tmp_path / "a.glb", "acescg")), field, atol=1e-6)
 
 

@@ -21,7 +21,7 @@ from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
 from cagefield.training.loop import run_to_end
 from commands import given_up, printed
 from full_disks import files_up_to, fill, small_disk
-from scenes import ball_field, ball_scene, source_files
+from scenes import ball_field, ball_scene, files_of
 from splat_scenes import ball_of_splats
 
 
@@ -49,7 +49,7 @@ def test_a_video_that_does_not_fit_leaves_the_old_one(tmp_path: Path, limit: int
         for number in range(8):
             add(noise(number))
     assert caught.value.filename == str(file)
-    assert source_files(tmp_path) == {"a.mp4": b"the old one"}
+    assert files_of(tmp_path) == {"a.mp4": b"the old one"}
 
 
 def test_rendering_to_a_full_disk_keeps_the_old_video(
@@ -74,14 +74,14 @@ def test_pictures_that_do_not_all_fit_leave_the_old_ones(
     out = tmp_path / "out"
     printed(capsys, "render", scene, "-o", out, "--turntable", "2", "--size", "64")
     (out / "notes.txt").write_text("mine")
-    before = source_files(out)
+    before = files_of(out)
     sizes = sorted(len(before[name]) for name in ("0000.png", "0001.png"))
     with files_up_to(3 * sizes[1]):
         line = given_up(capsys, "render", scene, "-o", out, "--size", "400", "--overwrite")
     assert "File too large" in line and str(out) in line
-    assert source_files(out) == before
+    assert files_of(out) == before
     printed(capsys, "render", scene, "-o", out, "--size", "32", "--overwrite")
-    after = source_files(out)
+    after = files_of(out)
     assert (
         after["notes.txt"] == b"mine"
         and set(after) == set(before)
@@ -103,12 +103,12 @@ def test_a_scene_that_does_not_fit_leaves_the_old_one(
     """Whether the first file fails, which safetensors writes, or one after it."""
     file = tmp_path / "e.yaml"
     file.write_text(EDITS)
-    before = source_files(tmp_path)
+    before = files_of(tmp_path)
     for arguments in (("-o", tmp_path / "new"), ("--overwrite",)):
         with files_up_to(limit):
             line = given_up(capsys, "edit", scene, file, *arguments)
         assert "File too large" in line and "/." not in line
-        assert source_files(tmp_path) == before
+        assert files_of(tmp_path) == before
 
 
 def test_a_field_that_does_not_fit_is_an_error_of_the_system(tmp_path: Path) -> None:
@@ -116,7 +116,7 @@ def test_a_field_that_does_not_fit_is_an_error_of_the_system(tmp_path: Path) -> 
     file.write_bytes(b"old")
     with files_up_to(1_000), pytest.raises(OSError, match="File too large") as caught:
         ball_field().save(file)
-    assert caught.value.filename == str(file) and source_files(tmp_path) == {file.name: b"old"}
+    assert caught.value.filename == str(file) and files_of(tmp_path) == {file.name: b"old"}
 
 
 def test_import_and_demo_on_a_full_disk(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -139,7 +139,7 @@ def test_a_place_that_cannot_be_written_is_noticed_at_the_start(
     monkeypatch.setattr(Scene, "save", lambda *_, **__: pytest.fail("began"))
     monkeypatch.setattr(Scene, "render", lambda *_, **__: pytest.fail("began"))
     (tmp_path / "e.yaml").write_text(EDITS)
-    before = source_files(tmp_path)
+    before = files_of(tmp_path)
     for arguments in (
         ("train", tmp_path, "-o", tmp_path / "new"),
         ("demo", "-o", tmp_path / "new"),
@@ -152,7 +152,7 @@ def test_a_place_that_cannot_be_written_is_noticed_at_the_start(
         with files_up_to(0):
             line = given_up(capsys, *arguments)
         assert f"{arguments[arguments.index('-o') + 1]}: File too large" in line
-    assert source_files(tmp_path) == before
+    assert files_of(tmp_path) == before
 
 
 class Steps:
@@ -230,7 +230,7 @@ def test_files_that_belong_together_are_written_together(tmp_path: Path) -> None
     with files_up_to(1_000), pytest.raises(OSError) as caught:
         write_texts({figures: "3", table: "4" * 2_000})
     assert caught.value.filename == str(table)
-    assert source_files(tmp_path) == {"a.json": b"1", "a.md": b"2"}
+    assert files_of(tmp_path) == {"a.json": b"1", "a.md": b"2"}
 
 
 def _missing(call: Callable[[int], None]) -> Callable[[int], None]:
@@ -257,7 +257,7 @@ def test_room_that_is_missed_when_a_file_is_closed(tmp_path: Path, monkeypatch: 
         pytest.fail("began")
     assert caught.value.filename == str(file)
     monkeypatch.undo()
-    assert source_files(tmp_path) == {"a.txt": b"old"}
+    assert files_of(tmp_path) == {"a.txt": b"old"}
 
 
 def test_a_field_that_is_missed_when_its_file_is_closed(
@@ -270,7 +270,7 @@ def test_a_field_that_is_missed_when_its_file_is_closed(
     with pytest.raises(OSError, match="No space left") as caught:
         ball_field().save(file)
     monkeypatch.undo()
-    assert caught.value.filename == str(file) and source_files(tmp_path) == {file.name: b"old"}
+    assert caught.value.filename == str(file) and files_of(tmp_path) == {file.name: b"old"}
 
 
 def test_a_curve_stays_where_the_scene_that_goes_with_it_does_not_fit(
@@ -280,7 +280,7 @@ def test_a_curve_stays_where_the_scene_that_goes_with_it_does_not_fit(
     curve, scene = tmp_path / "curve.csv", tmp_path / "new"
     arguments = ("bench", "training", photos, "-o", curve, "--steps", "3", "--resolution", "16")
     printed(capsys, *arguments, "--scene-out", scene)
-    before = source_files(tmp_path)
+    before = files_of(tmp_path)
     save = Scene.save
 
     def full(scene: Scene, path: Path, overwrite: bool = False) -> None:
@@ -290,7 +290,7 @@ def test_a_curve_stays_where_the_scene_that_goes_with_it_does_not_fit(
     monkeypatch.setattr(Scene, "save", full)
     line = given_up(capsys, *arguments, "--scene-out", scene, "--overwrite")
     assert "File too large" in line and str(scene) in line
-    assert source_files(tmp_path) == before
+    assert files_of(tmp_path) == before
 
 
 def test_a_place_that_is_none_is_named_and_not_what_is_hidden_there(tmp_path: Path) -> None:

@@ -237,7 +237,7 @@ def test_as_many_cameras_as_asked_have_a_point_in_their_picture() -> None:
         Camera.look_at(eye, at, width=20, height=20, fov_x=0.5) for eye, at in zip(eyes, targets, strict=True)
     ]
     points = np.array([[0.0, 0, 0], [6.0, 0, 0], [0, 5.0, 0], [-2.5, 0.05, 0]])
-    assert [in_frusta(cameras, points, least=n).tolist() for n in (1, 2, 3)] == [
+    assert [in_frusta(cameras, points, min_views=n).tolist() for n in (1, 2, 3)] == [
         [True, True, False, True],
         [True, True, False, True],
         [False, True, False, False],

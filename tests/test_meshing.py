@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cagefield.errors import FieldError
-from cagefield.fields.meshing import HALF, Mesh, mesh_of
+from cagefield.fields.meshing import SURFACE_OPTICAL_DEPTH, Mesh, extract_mesh
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.files.ply import read_ply
 from cagefield.formats.mesh_files import srgb_to_linear, write_mesh, write_points
@@ -25,7 +25,7 @@ def ball(n: int = 48, radius: float = RADIUS) -> VoxelField:
     axes = [np.linspace(low[k], high[k], n) for k in range(3)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     edge = (high[0] - low[0]) / (n - 1)
-    density = (HALF + (radius - np.linalg.norm(points - CENTER, axis=1)) / edge) / edge
+    density = (SURFACE_OPTICAL_DEPTH + (radius - np.linalg.norm(points - CENTER, axis=1)) / edge) / edge
     rgb = np.where(points[:, :1] > CENTER[0], (0.8, 0.1, 0.1), (0.1, 0.2, 0.9))
     return VoxelField(
         bounds=np.stack([low, high]),
@@ -37,7 +37,7 @@ def ball(n: int = 48, radius: float = RADIUS) -> VoxelField:
 
 
 def test_a_balls_mesh_is_the_ball() -> None:
-    mesh = mesh_of(ball())
+    mesh = extract_mesh(ball())
     offset = np.linalg.norm(mesh.positions - CENTER, axis=1) - RADIUS
     # A chord of one edge is h^2 / (8 r) = 4.6e-4 from its arc.
     assert np.abs(offset).max() < 5e-4
@@ -55,7 +55,7 @@ def test_a_balls_mesh_is_the_ball() -> None:
 
 def test_finer_voxels_bring_the_mesh_nearer_by_their_square() -> None:
     errors = [
-        np.abs(np.linalg.norm(mesh_of(ball(n)).positions - CENTER, axis=1) - RADIUS).mean()
+        np.abs(np.linalg.norm(extract_mesh(ball(n)).positions - CENTER, axis=1) - RADIUS).mean()
         for n in (24, 47, 93)  # edges halve
     ]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
@@ -63,7 +63,7 @@ def test_finer_voxels_bring_the_mesh_nearer_by_their_square() -> None:
 
 
 def test_what_the_grid_cuts_is_closed() -> None:
-    mesh = mesh_of(ball(32, radius=3.0), level=1e-3)
+    mesh = extract_mesh(ball(32, radius=3.0), level=1e-3)
     solid = trimesh.Trimesh(mesh.positions, mesh.faces, process=False)
     assert solid.is_watertight
     # The grid's box, and an edge around it at most.
@@ -71,8 +71,8 @@ def test_what_the_grid_cuts_is_closed() -> None:
 
 
 def test_kept_faces_have_all_their_vertices() -> None:
-    mesh = mesh_of(ball())
-    half = mesh.kept(mesh.positions[:, 2] > CENTER[2])
+    mesh = extract_mesh(ball())
+    half = mesh.select_vertices(mesh.positions[:, 2] > CENTER[2])
     assert 0.45 < len(half.faces) / len(mesh.faces) < 0.5
     assert half.faces.max() == len(half.positions) - 1 and half.positions[:, 2].min() > CENTER[2]
     triangles = half.positions[half.faces]
@@ -82,12 +82,12 @@ def test_kept_faces_have_all_their_vertices() -> None:
 
 def test_an_empty_field_has_no_surface() -> None:
     with pytest.raises(FieldError, match="has no surface: its density is"):
-        mesh_of(ball(), level=1e9)
+        extract_mesh(ball(), level=1e9)
 
 
 @pytest.fixture(scope="module")
 def mesh() -> Mesh:
-    return mesh_of(ball(16))
+    return extract_mesh(ball(16))
 
 
 def test_another_program_reads_the_ply(mesh: Mesh, tmp_path: Path) -> None:

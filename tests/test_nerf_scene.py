@@ -18,7 +18,7 @@ from cagefield.formats.nerf.nerf_pytorch_config import SamplingSettings, find_co
 from commands import printed, refused
 from nerf_networks import krrish94_state, small_field, small_mlp, yenchenlin_state
 from posed_photos import save
-from scenes import ball_scene, source_files
+from scenes import ball_scene, files_of
 
 
 def equal(one: NerfField, other: NerfField) -> bool:
@@ -305,11 +305,11 @@ def test_exact_pictures_show_the_original_through_the_edits(scene) -> None:
 
 
 def test_baking_anew_changes_the_voxels_alone(scene, tmp_path, capsys) -> None:
-    before = source_files(scene)
+    before = files_of(scene)
     text = printed(capsys, "bake", scene, "-o", tmp_path / "new", "--resolution", 20, "--compare", 1)
     assert "PSNR of the voxels against the original" in text and "(1 views)" in text
-    assert source_files(scene) == before
-    after = source_files(tmp_path / "new")
+    assert files_of(scene) == before
+    after = files_of(tmp_path / "new")
     # The order of a safetensors file's header is not fixed: the original is compared as it is read.
     changed = {name for name in after if after[name] != before[name]}
     assert changed - {"original.safetensors"} == {"field.safetensors"}

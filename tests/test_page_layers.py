@@ -11,7 +11,7 @@ from cagefield.completion.pasting.paste_composite import composite_paste
 from cagefield.completion.pasting.paste_content import SourceContent, extract_content
 from cagefield.edits import Edit, EditStack
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.fields.voxel_layers import ALIGNED
+from cagefield.fields.voxel_layers import BRICK_VERTICES
 from cagefield.geometry.cage import Cage
 from cagefield.images.metrics import psnr
 from cagefield.pages.page_edits import MAGIC, VERSION, encode_changed_edits, encode_page_edits
@@ -251,4 +251,4 @@ def test_an_empty_layer_empties_what_the_field_has_there() -> None:
 
 
 def test_places_keep_bricks_whole() -> None:
-    assert ALIGNED == BRICK
+    assert BRICK_VERTICES == BRICK

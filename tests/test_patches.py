@@ -25,7 +25,7 @@ from cagefield.edits.options import Clone
 from cagefield.edits.patch import Patch
 from cagefield.errors import EditError, EditFileError
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.fields.voxel_layers import ALIGNED, places_of, slices_of
+from cagefield.fields.voxel_layers import BRICK_VERTICES, layer_slices, layer_x_offsets
 from cagefield.geometry.cage import Cage
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.voxels.voxel_renderer import Renderer
@@ -222,7 +222,7 @@ def test_kernel_and_oracle_read_the_same_layers(contracted: bool) -> None:
     edit = Edit(inner, adjustment="discrete").translate((-size, 0.0, 0.1 * size)).rotate((0.0, 0.0, 0.4))
     earlier = Edit(inner, inner.grown(0.2 * size), lattice=16).translate((0.05 * size, 0.0, 0.0))
     stack = EditStack([earlier, edit.replace(patch=patch)])
-    assert len(set(stack.places)) == 2 and min(stack.places) >= max(field.resolution) - ALIGNED
+    assert len(set(stack.places)) == 2 and min(stack.places) >= max(field.resolution) - BRICK_VERTICES
     camera = Camera.look_at(
         (1.2 * size, -2.5 * size, 1.4 * size), tuple(box.mean(axis=0)), width=40, height=40, fov_x=0.7
     )
@@ -248,14 +248,14 @@ def test_layers_lie_behind_the_field_and_apart() -> None:
         for box in ([[-1, -1, -1], [0, 0, 0]], [[0, 0, 0], [1, 1, 1]])
     )
     again = dataclasses.replace(low)
-    places = places_of((low, high, again))
+    places = layer_x_offsets((low, high, again))
     spans = [
-        (p + slices_of(layer)[0], p + slices_of(layer)[1])
+        (p + layer_slices(layer)[0], p + layer_slices(layer)[1])
         for p, layer in zip(places, (low, high, again), strict=True)
     ]
     # The same layer twice is there once.
-    assert places_of((low, high, low, again)) == (places[0], places[1], places[0], places[2])
-    assert all(p % ALIGNED == 0 for p in places) and spans[0][0] >= 24
+    assert layer_x_offsets((low, high, low, again)) == (places[0], places[1], places[0], places[2])
+    assert all(p % BRICK_VERTICES == 0 for p in places) and spans[0][0] >= 24
     assert all(before[1] <= after[0] for before, after in itertools.pairwise(spans))
 
 

@@ -12,7 +12,7 @@ import cagefield
 from cagefield import Cage, Edit, EditStack, Scene, load_dataset
 from cagefield.cameras.camera import Camera
 from cagefield.errors import FieldError
-from cagefield.fields.baking import _Grid, bake, surrounding, widened
+from cagefield.fields.baking import _Grid, bake, enclosing_mask, widen_splats
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.quaternions import rotation_matrices
@@ -155,7 +155,7 @@ def test_wider_splats_cover_more_with_less() -> None:
         np.zeros((2, 1, 3)),
     )
     widths = np.stack([np.zeros((3, 3)), np.diag([0.04, 0.02, 0.1]) @ np.ones((3, 3))])
-    wide = widened(field, widths)
+    wide = widen_splats(field, widths)
     plain, blurred = covariances_of(field), covariances_of(wide)
     np.testing.assert_allclose(blurred, plain + widths @ widths.transpose(0, 2, 1), rtol=1e-4, atol=1e-8)
     assert wide.opacities[0] == pytest.approx(0.8, rel=1e-5)
@@ -174,10 +174,10 @@ def test_splats_around_a_camera_are_no_veil_in_voxels() -> None:
         np.log([[0.25, 0.2, 0.05]]), turned, np.array([0.9]), np.full((1, 1, 3), 2.0),
     )  # fmt: skip
     # 0.4 away along the axis of scale 0.25: 1.6 standard deviations
-    np.testing.assert_array_equal(surrounding(veil, eye[None]), [True])
-    np.testing.assert_array_equal(surrounding(veil, eye[None] + [[3.0, 0, 0]]), [False])
+    np.testing.assert_array_equal(enclosing_mask(veil, eye[None]), [True])
+    np.testing.assert_array_equal(enclosing_mask(veil, eye[None] + [[3.0, 0, 0]]), [False])
     farther = replace(veil, log_scales=np.log([[0.15, 0.2, 0.05]]))
-    np.testing.assert_array_equal(surrounding(farther, eye[None]), [False])
+    np.testing.assert_array_equal(enclosing_mask(farther, eye[None]), [False])
     both = SplatField(
         *(
             np.concatenate([getattr(scene.field, name), getattr(veil, name)])

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cagefield.fields.sh import MAX_DEGREE, sh_basis
-from cagefield.fields.sh_rotation import rotated_sh, wigner_matrices
+from cagefield.fields.sh_rotation import rotate_sh_each, wigner_matrices
 
 
 @pytest.mark.parametrize("degree", range(MAX_DEGREE + 1))
@@ -19,7 +19,7 @@ def test_rotated_coefficients_are_the_function_at_rotated_directions(degree: int
     d /= np.linalg.norm(d, axis=1, keepdims=True)
     back = np.einsum("nji,nj->ni", R, d)  # R^T d
     expected = np.einsum("nk,nkc->nc", sh_basis(back, degree), sh)
-    got = np.einsum("nk,nkc->nc", sh_basis(d, degree), rotated_sh(sh, R))
+    got = np.einsum("nk,nkc->nc", sh_basis(d, degree), rotate_sh_each(sh, R))
     # coefficients are rounded to float32: 1e-7 of sums of up to 16 terms
     np.testing.assert_allclose(got, expected, atol=3e-6)
 

@@ -11,7 +11,7 @@ from cagefield.errors import FieldError
 from cagefield.fields import sh
 from cagefield.fields.protocol import Field
 from cagefield.fields.splat_field import SplatField
-from cagefield.fields.splat_mixture import LEAST, MAX_OPACITY
+from cagefield.fields.splat_mixture import MAX_OPACITY, MIN_RAY_OPACITY
 from cagefield.geometry.quaternions import rotation_matrices
 from splat_scenes import random_splats
 
@@ -28,7 +28,7 @@ def plain_sum(field: SplatField, points: np.ndarray, along: np.ndarray) -> tuple
             -0.5 * np.einsum("pi,ij,pj->p", offset, inverse, offset)
         )
         # 0.99^3000 is 1e-13
-        li = np.where(z < LEAST, 0.0, (z[:, None] ** k / np.sqrt(k)).sum(axis=1))
+        li = np.where(z < MIN_RAY_OPACITY, 0.0, (z[:, None] ** k / np.sqrt(k)).sum(axis=1))
         sigma = li * np.sqrt(np.einsum("pi,ij,pj->p", along, inverse, along) / (2.0 * np.pi))
         shown = 0.5 + np.einsum("pt,tc->pc", sh.sh_basis(along, field.sh_degree), field.sh[n].astype(float))
         total += sigma
@@ -97,8 +97,8 @@ def test_a_ray_loses_what_a_picture_shows(opacity: float) -> None:
         points = (origin + t[:, None] * direction).astype(np.float32)
         sigma, _ = splat(points, np.tile(direction.astype(np.float32), (len(t), 1)))
         lost = 1.0 - np.exp(-sigma.astype(float).sum() * width / 400.0)
-        # what falls below LEAST is left out on the flanks
-        assert lost == pytest.approx(opacity * g, abs=1.5 * LEAST)
+        # what falls below MIN_RAY_OPACITY is left out on the flanks
+        assert lost == pytest.approx(opacity * g, abs=1.5 * MIN_RAY_OPACITY)
 
 
 def test_rays_through_many_splats_lose_the_product() -> None:
@@ -124,8 +124,8 @@ def test_rays_through_many_splats_lose_the_product() -> None:
             np.tile(direction.astype(np.float32), (len(t), 1)),
         )
         sums = composite(sigma[None], rgb[None], t[None].astype(np.float32), np.float32(5e-4))
-        # 25 splats, each off by LEAST at most, few of them by that much
-        assert sums.opacity[0] == pytest.approx(1.0 - left, abs=4 * LEAST)
+        # 25 splats, each off by MIN_RAY_OPACITY at most, few of them by that much
+        assert sums.opacity[0] == pytest.approx(1.0 - left, abs=4 * MIN_RAY_OPACITY)
 
 
 @pytest.mark.parametrize("opacity", [0.3, 0.99])
@@ -145,8 +145,10 @@ def test_grids_may_sample_what_a_ray_across_a_flat_splat_loses(opacity: float) -
         for phase in (0.0, 0.3, 0.5):
             t = 2.0 * scales[thin] * (np.arange(-6, 7) + phase)
             sigma = splat.grid_sigma(origin + t[:, None] * axes[:, thin])
-            # Samples two scales apart: 2 exp(-2 pi^2 / 4) = 1.4 %; the ends at LEAST take off some more.
-            assert sigma.sum() * 2.0 * scales[thin] == pytest.approx(mean * lost, rel=0.025, abs=4 * LEAST)
+            # Samples two scales apart: 2 exp(-2 pi^2 / 4) = 1.4 %; the ends at MIN_RAY_OPACITY cost more.
+            assert sigma.sum() * 2.0 * scales[thin] == pytest.approx(
+                mean * lost, rel=0.025, abs=4 * MIN_RAY_OPACITY
+            )
 
 
 def test_units_do_not_matter() -> None:

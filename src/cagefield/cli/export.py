@@ -233,7 +233,7 @@ class Export:
         with progress_bar("Meshing") as move:
             mesh = scene_mesh(scene, self.resolution, lambda done: move(done, 1.0, ""))
         if cages:
-            mesh = mesh.kept(inside(cages, mesh.positions))
+            mesh = mesh.select_vertices(inside(cages, mesh.positions))
         up, offset = scene.up, scene.offset
         if self.source_coordinates:
             back = world_to_source(scene)

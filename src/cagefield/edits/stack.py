@@ -13,7 +13,7 @@ from cagefield.edits.edit import Edit, bounds_of
 from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.fields.voxel_layers import places_of
+from cagefield.fields.voxel_layers import layer_x_offsets
 from cagefield.typing import Array, Mask
 
 
@@ -125,7 +125,7 @@ class EditStack:
     @property
     def places(self) -> tuple[int, ...]:
         """The places of the layers (`fields.voxel_layers`)."""
-        return places_of(self.layers)
+        return layer_x_offsets(self.layers)
 
     @property
     def boxes(self) -> Array:

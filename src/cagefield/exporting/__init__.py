@@ -20,8 +20,8 @@ from cagefield.edits import EditStack
 from cagefield.edits.edit_files import load_edits, parse_edits
 from cagefield.errors import CagefieldError, EditError
 from cagefield.fields.baking import bake
-from cagefield.fields.meshing import Mesh, mesh_of
-from cagefield.fields.sh_rotation import turned_sh
+from cagefield.fields.meshing import Mesh, extract_mesh
+from cagefield.fields.sh_rotation import rotate_sh
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import Cage
 from cagefield.rendering.edited_field import EditedField, edited_bounds
@@ -117,7 +117,7 @@ def upright(splats: SplatField, up: ArrayLike) -> SplatField:
         splats,
         means=splats.means @ turn.T.astype(np.float32),
         quaternions=splats.quaternions @ product.T.astype(np.float32),
-        sh=turned_sh(splats.sh, turn),
+        sh=rotate_sh(splats.sh, turn),
         bounds=np.stack([corners.min(axis=0), corners.max(axis=0)]),
         offset=tuple((turn @ np.array(splats.offset)).tolist()),
     )
@@ -145,7 +145,7 @@ def scene_mesh(
     field = scene.field
     edited = bool(scene.edits.active)
     if not isinstance(field, SplatField) and not (edited or field.contracted or resolution):
-        return mesh_of(field)
+        return extract_mesh(field)
     bounds = edited_bounds(field.bounds, scene.patched_edits)
     if isinstance(field, SplatField):
         source: SplatField | EditedField = replace(baked(scene), bounds=bounds)
@@ -162,7 +162,7 @@ def scene_mesh(
         eyes=np.array(eyes) if eyes else None,
         on_progress=on_progress,
     )
-    return mesh_of(voxels)
+    return extract_mesh(voxels)
 
 
 def scene_points(scene: Scene, count: int, on_stage: OnStage) -> SurfacePoints:

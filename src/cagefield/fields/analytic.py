@@ -1,4 +1,4 @@
-"""Closed-form radiance fields, the oracles of the renderers.
+"""Closed-form radiance fields, used as oracles of the renderers.
 
 Notation: a point x, a unit view direction d, a ray o + t d. Every component knows its optical depth
 tau = integral of sigma along a ray segment in closed form; opacity is 1 - exp(-tau) (Beer-Lambert).
@@ -17,8 +17,8 @@ from scipy.special import erf
 from cagefield.errors import FieldError
 from cagefield.typing import Array, Float32
 
-GAUSSIAN_REACH = 5.0
-"""Standard deviations after which a blob is no longer sampled: exp(-12.5) = 3.7e-6 of the peak."""
+GAUSSIAN_REACH_SIGMAS = 5.0
+"""Extent of a blob's bounds in standard deviations; beyond it sigma is below 3.7e-6 of the peak."""
 
 
 def _vector(name: str, value: ArrayLike, *, low: float = -np.inf, high: float = np.inf) -> Array:
@@ -40,7 +40,7 @@ def _positive(name: str, value: float) -> float:
 
 
 class Component(Protocol):
-    """A density with one colour law; AnalyticField adds several up."""
+    """Density with one color law; a summand of AnalyticField."""
 
     rgb: Any
 
@@ -132,7 +132,7 @@ class GaussianBlob:
 
     @property
     def bounds(self) -> Array:
-        reach = GAUSSIAN_REACH * self.scale
+        reach = GAUSSIAN_REACH_SIGMAS * self.scale
         return np.stack([self.center - reach, self.center + reach])
 
     def sigma(self, positions: NDArray[Any]) -> Array:
@@ -151,10 +151,10 @@ class GaussianBlob:
 
 @dataclass(frozen=True)
 class AnalyticField:
-    """Sum of components: sigma adds up, rgb is the sigma-weighted mean of the components' colours.
+    """Sum of components: sigma adds up, rgb is the sigma-weighted mean of the components' colors.
 
     rgb of a component may vary linearly: rgb + position_slope @ x + view_slope @ d, clipped to [0,1].
-    Slopes are [3,3] (colour channel, axis) and shared by all components.
+    Slopes are [3,3] (color channel, axis) and shared by all components.
     """
 
     components: tuple[Component, ...]
@@ -184,7 +184,7 @@ class AnalyticField:
 
     @property
     def bounds(self) -> Array:
-        """Box [2,3] that holds every component (a blob up to GAUSSIAN_REACH standard deviations)."""
+        """Box [2,3] that holds every component (a blob up to GAUSSIAN_REACH_SIGMAS standard deviations)."""
         boxes = np.stack([component.bounds for component in self.components])
         return np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
 

@@ -1,20 +1,20 @@
-"""Baking: any field as a VoxelField, so that it can be edited at interactive speed.
+"""Baking of any field into a VoxelField, for editing at interactive speed.
 
-Density is the field's at the vertices: a signed one, negative in empty space, where the field has
-`signed_density`, because a voxel field clamps after it interpolates and so keeps surfaces between vertices
-where they are. A vertex is stored where the field absorbs at least `opacity` over a
-voxel's edge there or at a neighbour; a first pass on every other vertex finds where to look. Colour is
-fitted to the field's, seen along several directions: with C the colours and Y_k the basis along direction k,
+Densities are the field's at the vertices; signed ones, negative in empty space, where the field has
+`signed_density`: a voxel field clamps after the interpolation and so preserves surfaces between vertices. A
+vertex is stored where the field absorbs at least `opacity` over a voxel's edge at the vertex or at a
+neighbor; a first pass on every other vertex finds candidates. Colors are fitted to the field's colors along
+several directions: with C the colors and Y_k the basis along direction k,
 
     sh = argmin_x sum_k w_k |0.5 + Y_k x - C_k|^2 + ridge |x without its constant|^2
 
-w_k is 1 for directions that meet the front of the density's surface (against its gradient) and `BACK` for
-those that meet its back, which no camera sees.
+w_k is 1 for directions that meet the front of the density's surface (against its gradient) and
+BACK_FACE_WEIGHT for directions that meet its back, which no camera sees.
 
-Splats are finer than voxels: each is widened first, by a Gaussian of `FILTER` voxel edges where it is, and
-becomes less opaque in proportion to the area that it then covers. One that a camera stands in is left out:
-a picture of splats shows it where its mean is, one of voxels as a veil all over. Their density is the mean
-one over directions (`SplatField.grid_sigma`).
+Splats are finer than voxels: each is first convolved with a Gaussian of FILTER_SIGMA_EDGES voxel edges, and
+becomes less opaque in proportion to the area that it then covers. A splat around a camera is left out: an
+image of splats draws it at its mean, an image of voxels as a veil over everything. Densities of splats are
+means over directions (`SplatField.grid_sigma`).
 """
 
 from __future__ import annotations
@@ -34,22 +34,23 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.typing import AnyArray, Float32
 
-BACK = 0.02
-"""Weight of a direction from which a vertex is seen through its own surface."""
+BACK_FACE_WEIGHT = 0.02
+"""Weight of a direction that meets a vertex from behind its own surface."""
 
-RIDGE = 2e-3
+RIDGE_WEIGHT = 2e-3
 """Weight of the coefficients' size against a residual's, per direction."""
 
-FILTER = 0.35
-"""Standard deviation by which splats are widened, in voxel edges: a layer's samples add up within 18 %.
+FILTER_SIGMA_EDGES = 0.35
+"""Standard deviation of the splats' filter, in voxel edges; samples across a layer sum up within 18 %.
 
-.25 shows a capture of many layers .2 dB better and single layers with gaps, .4 loses as much again.
+.25 renders a capture of many layers .2 dB better, but leaves gaps in single layers; .4 loses another .2 dB.
 """
 
-BLOCK = 1 << 16
-"""Vertices evaluated at a time."""
+BLOCK_VERTICES = 1 << 16
+"""Number of vertices evaluated at a time."""
 
-_STEP = 2  # the first pass samples every so-many-th vertex along each axis
+_COARSE_STRIDE = 2
+"""Stride of the first pass's vertices along each axis."""
 
 
 def bake(
@@ -62,22 +63,22 @@ def bake(
     views: int = 16,
     opacity: float = 2e-3,
     contracted: bool = False,
-    seen: Callable[[Float32], NDArray[np.bool_]] | None = None,
+    visible: Callable[[Float32], NDArray[np.bool_]] | None = None,
     seed: int = 0,
     on_progress: Callable[[float], None] | None = None,
 ) -> VoxelField:
-    """The field on a voxel grid with `resolution` vertices along the longest axis of what it holds.
+    """VoxelField with `resolution` vertices along the longest axis of the field's content.
 
-    - bounds: [2,3] the box to look in; the field's own where left out.
-    - eyes: [E,3] where cameras stand, world units: colours are fitted along directions from them, from all
-      around the sphere where left out.
-    - views: directions for each vertex.
+    - bounds: [2,3] box to search for content; None takes the field's own.
+    - eyes: [E,3] camera positions, world units: colors are fitted along directions from them; None takes
+      directions all around the sphere.
+    - views: number of directions per vertex.
     - opacity: vertices whose voxel absorbs less are empty.
     - contracted: bake all of space, with `bounds` as the box of interest.
-    - seen: True [N] for positions [N,3] that are worth baking; all are where left out.
+    - visible: function of positions [N,3] that returns the mask [N] of positions to bake; None bakes all.
 
     Raises:
-        FieldError: options outside their range, infinite bounds, a field that is empty in them.
+        FieldError: options out of range, infinite bounds, or a field that is empty within them.
     """
     if not 16 <= resolution <= 1024:
         raise FieldError(f"resolution is {resolution}; it must be from 16 to 1024")
@@ -90,18 +91,18 @@ def bake(
         raise FieldError(f"bounds must be a finite box [2,3] to bake in, got {box.tolist()}; give bounds=")
     report = on_progress or (lambda done: None)
 
-    places = None if eyes is None else np.asarray(eyes, np.float64).reshape(-1, 3)
-    if isinstance(field, SplatField) and places is not None:
-        field = field.take(~surrounding(field, places))
-    density = _Density(field, None if places is None else places.mean(axis=0))
+    eye_positions = None if eyes is None else np.asarray(eyes, np.float64).reshape(-1, 3)
+    if isinstance(field, SplatField) and eye_positions is not None:
+        field = field.take(~enclosing_mask(field, eye_positions))
+    density = _Density(field, None if eye_positions is None else eye_positions.mean(axis=0))
     if contracted:
         grid = _Grid.contracting(box, resolution)
     else:
-        box = _content(density, box, opacity, lambda done: report(0.1 * done))
+        box = _content_box(density, box, opacity, lambda done: report(0.1 * done))
         grid = _Grid.within(box, resolution)
-    density = density.on(grid)
-    least = -np.log1p(-opacity) / grid.edge
-    candidates = _candidates(density, grid, least, seen, lambda done: report(0.1 + 0.2 * done))
+    density = density.for_grid(grid)
+    min_density = -np.log1p(-opacity) / grid.edge
+    candidates = _candidates(density, grid, min_density, visible, lambda done: report(0.1 + 0.2 * done))
     sigma = np.zeros(grid.shape, np.float32)
     for rows in _blocks(grid.shape[0], 8):
         part = np.argwhere(candidates[rows])
@@ -109,17 +110,19 @@ def bake(
         sigma[rows][candidates[rows]] = density(grid.positions(part))
     del candidates
     report(0.4)
-    stored = grown(sigma > least)
+    stored = dilate_mask(sigma > min_density)
     if not stored.any():
         raise _empty(box)
     vertices = np.argwhere(stored)
     coefficients = np.zeros((len(vertices), (sh_degree + 1) ** 2, 3), np.float32)
-    chance = np.random.default_rng(seed)
-    for rows in _blocks(len(vertices), max(1, 4 * BLOCK // views)):
+    rng = np.random.default_rng(seed)
+    for rows in _blocks(len(vertices), max(1, 4 * BLOCK_VERTICES // views)):
         points = grid.positions(vertices[rows])
-        along = _directions(points, places, views, chance)
+        directions = _directions(points, eye_positions, views, rng)
         front = _gradient(sigma, vertices[rows])
-        coefficients[rows] = _fit(_colours(density.field, points, along), along, front, sh_degree)
+        coefficients[rows] = _fit_harmonics(
+            _evaluate_colors(density.field, points, directions), directions, front, sh_degree
+        )
         report(0.4 + 0.6 * rows.stop / len(vertices))
     nx, ny, nz = grid.shape
     return VoxelField(
@@ -133,9 +136,9 @@ def bake(
 
 
 class _Grid:
-    """Vertices over a box, evenly `edge` apart: cubes, so the box may grow a little at its upper side.
+    """Grid of cubic voxels over a box, which may be enlarged at its upper side.
 
-    `edge` is in world units, inside the box of interest where the grid is contracted.
+    `edge` is in world units, inside the box of interest for contracted grids.
     """
 
     def __init__(
@@ -151,7 +154,7 @@ class _Grid:
 
     @classmethod
     def contracting(cls, interest: AnyArray, resolution: int) -> _Grid:
-        """The grid of all of space, contracted around the box of interest."""
+        """Grid of all of space, contracted around the box of interest."""
         edge = 2.0 * float((interest[1] - interest[0]).max()) / (resolution - 1)
         return cls(np.full(3, -2.0), edge, (resolution,) * 3, interest)
 
@@ -160,7 +163,7 @@ class _Grid:
         return np.stack([self.lower, self.lower + (np.array(self.shape) - 1) * self.edge])
 
     def steps_at(self, positions: AnyArray) -> AnyArray:
-        """World displacements [N,3,3] (columns) of one step along each axis of the grid, at positions [N,3].
+        """World displacements [N,3,3] (columns) of one grid step along each axis, at positions [N,3].
 
         With c contracted, M = max|c| > 1 on axis k, uncontract(c) = c / (M (2 - M)) has the derivative
         I / (M (2 - M)) + c e_k^T sign(c_k) (2 M - 2) / (M (2 - M))^2.
@@ -186,8 +189,8 @@ class _Grid:
         return (middle + half * uncontract(cube)).astype(np.float32)
 
 
-def grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """True where a vertex or one of its 26 neighbours is True."""
+def dilate_mask(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Mask dilated by the 26 neighbors of each vertex."""
     for axis in range(3):
         ahead, behind = np.zeros_like(mask), np.zeros_like(mask)
         front = [slice(None)] * 3
@@ -205,12 +208,14 @@ def _empty(box: AnyArray) -> FieldError:
     )
 
 
-def _content(density: _Density, box: AnyArray, opacity: float, report: Callable[[float], None]) -> AnyArray:
-    """The part of `box` that holds density, by 96 vertices along its longest axis, widened by one."""
+def _content_box(
+    density: _Density, box: AnyArray, opacity: float, report: Callable[[float], None]
+) -> AnyArray:
+    """Box [2,3] of the density within `box`, from 96 vertices along its longest axis, enlarged by one."""
     grid = _Grid.within(box, 96)
-    density = density.on(grid)
+    density = density.for_grid(grid)
     sigma = np.concatenate(
-        [density(grid.positions(_plane(grid.shape, index))) for index in _reported(grid.shape[0], report)]
+        [density(grid.positions(_plane(grid.shape, index))) for index in _report_each(grid.shape[0], report)]
     ).reshape(grid.shape)
     found = np.argwhere(sigma > -np.log1p(-opacity) / grid.edge)
     if len(found) == 0:
@@ -223,44 +228,46 @@ def _content(density: _Density, box: AnyArray, opacity: float, report: Callable[
 def _candidates(
     density: _Density,
     grid: _Grid,
-    least: float,
-    seen: Callable[[Float32], NDArray[np.bool_]] | None,
+    min_density: float,
+    visible: Callable[[Float32], NDArray[np.bool_]] | None,
     report: Callable[[float], None],
 ) -> NDArray[np.bool_]:
-    """Vertices of the grid around those of every `_STEP`-th that hold density and are seen."""
-    shape = tuple(-(-n // _STEP) for n in grid.shape)
+    """Mask of grid vertices around every `_COARSE_STRIDE`-th vertex with density that is visible."""
+    shape = tuple(-(-n // _COARSE_STRIDE) for n in grid.shape)
     occupied = np.zeros(shape, bool)
-    for index in _reported(shape[0], report):
-        positions = grid.positions(_STEP * _plane(shape, index))
-        look = np.ones(len(positions), bool) if seen is None else seen(positions)
+    for index in _report_each(shape[0], report):
+        positions = grid.positions(_COARSE_STRIDE * _plane(shape, index))
+        is_visible = np.ones(len(positions), bool) if visible is None else visible(positions)
         holds = np.zeros(len(positions), bool)
-        holds[look] = density(positions[look]) > 0.5 * least
+        holds[is_visible] = density(positions[is_visible]) > 0.5 * min_density
         occupied[index] = holds.reshape(shape[1:])
-    fine = grown(occupied)
+    fine = dilate_mask(occupied)
     for axis in range(3):
-        fine = np.repeat(fine, _STEP, axis=axis)
+        fine = np.repeat(fine, _COARSE_STRIDE, axis=axis)
     found: NDArray[np.bool_] = fine[tuple(slice(n) for n in grid.shape)]
     return found
 
 
 class _Density:
-    """Density [N] of positions [N,3], seen from where the cameras stand on average, else along -z."""
+    """Density [N] at positions [N,3], viewed from the mean camera position, else along -z."""
 
     def __init__(self, field: Field, eye: AnyArray | None) -> None:
         self.field, self.eye = field, eye
         self.signed = getattr(field, "signed_density", None)
 
-    def on(self, grid: _Grid) -> _Density:
-        """The density for this grid: splats as wide as its voxels let them be."""
+    def for_grid(self, grid: _Grid) -> _Density:
+        """Density for a grid: splats filtered by the grid's voxel size."""
         if not isinstance(self.field, SplatField):
             return self
-        return _Density(widened(self.field, FILTER * grid.steps_at(self.field.means)), self.eye)
+        return _Density(
+            widen_splats(self.field, FILTER_SIGMA_EDGES * grid.steps_at(self.field.means)), self.eye
+        )
 
     def __call__(self, positions: Float32) -> Float32:
         if isinstance(self.field, SplatField):
             return self.field.grid_sigma(positions)
         sigma = np.empty(len(positions), np.float32)
-        for rows in _blocks(len(positions), BLOCK):
+        for rows in _blocks(len(positions), BLOCK_VERTICES):
             part = positions[rows]
             toward = np.broadcast_to(np.array([0.0, 0.0, -1.0], np.float32), part.shape)
             if self.eye is not None:
@@ -270,8 +277,8 @@ class _Density:
         return sigma
 
 
-def surrounding(field: SplatField, eyes: AnyArray) -> NDArray[np.bool_]:
-    """True [N] for splats that have one of the eyes [E,3] within 2 standard deviations."""
+def enclosing_mask(field: SplatField, eyes: AnyArray) -> NDArray[np.bool_]:
+    """Mask [N] of splats with one of the eyes [E,3] within 2 standard deviations."""
     axes = (
         rotation_matrices(field.quaternions.astype(np.float64))
         / np.exp(field.log_scales.astype(np.float64))[:, None]
@@ -282,10 +289,10 @@ def surrounding(field: SplatField, eyes: AnyArray) -> NDArray[np.bool_]:
     return found
 
 
-def widened(field: SplatField, widths: AnyArray) -> SplatField:
-    """The splats convolved with Gaussians of covariances W W^T, `widths` W [N,3,3] in world units.
+def widen_splats(field: SplatField, widths: AnyArray) -> SplatField:
+    """Splats convolved with Gaussians of covariances W W^T, `widths` W [N,3,3] in world units.
 
-    The opacity of each falls as the area grows that it covers across its thinnest axis.
+    Opacities decrease as the area across each splat's thinnest axis grows.
     """
     from scipy.spatial.transform import Rotation
 
@@ -295,9 +302,9 @@ def widened(field: SplatField, widths: AnyArray) -> SplatField:
     variances, turned = np.linalg.eigh(covariances)
     turned[:, :, 0] *= np.sign(np.linalg.det(turned))[:, None]
     thinnest = axes[np.arange(len(scales)), :, scales.argmin(axis=1)]
-    # The area of a Gaussian's shadow along a unit u is that of sqrt(det C u^T C^-1 u).
-    along = np.einsum("ni,nij->nj", thinnest, turned) ** 2
-    covered = np.sqrt(variances.prod(axis=1) * (along / variances).sum(axis=1))
+    # The projected area of a Gaussian along a unit u is proportional to sqrt(det C u^T C^-1 u).
+    squared_cosines = np.einsum("ni,nij->nj", thinnest, turned) ** 2
+    covered = np.sqrt(variances.prod(axis=1) * (squared_cosines / variances).sum(axis=1))
     area = np.sort(scales, axis=1)[:, 1:].prod(axis=1)
     return replace(
         field,
@@ -308,7 +315,7 @@ def widened(field: SplatField, widths: AnyArray) -> SplatField:
 
 
 def _gradient(sigma: Float32, vertices: AnyArray) -> Float32:
-    """Central differences [M,3] of a grid at vertices [M,3]; one-sided at its faces."""
+    """Central differences [M,3] of a grid at vertices [M,3]; one-sided at the boundary."""
     last = np.array(sigma.shape) - 1
     slopes = np.empty((len(vertices), 3), np.float32)
     for axis in range(3):
@@ -319,33 +326,35 @@ def _gradient(sigma: Float32, vertices: AnyArray) -> Float32:
     return slopes
 
 
-def _colours(field: Field, positions: Float32, along: Float32) -> Float32:
+def _evaluate_colors(field: Field, positions: Float32, directions: Float32) -> Float32:
     """rgb [N,K,3] at positions [N,3] along directions [N,K,3]."""
     seen_along = getattr(field, "seen_along", None)
     if seen_along is not None:
-        return np.asarray(seen_along(positions, along)[1], np.float32)
-    n, views, _ = along.shape
-    return field(np.repeat(positions, views, axis=0), along.reshape(-1, 3))[1].reshape(n, views, 3)
+        return np.asarray(seen_along(positions, directions)[1], np.float32)
+    n, views, _ = directions.shape
+    return field(np.repeat(positions, views, axis=0), directions.reshape(-1, 3))[1].reshape(n, views, 3)
 
 
-def _directions(points: Float32, eyes: AnyArray | None, views: int, chance: np.random.Generator) -> Float32:
-    """Unit directions [N,K,3] into the scene, from the eyes or from all around."""
-    away = np.asarray(chance.normal(size=(len(points), views, 3)))
+def _directions(points: Float32, eyes: AnyArray | None, views: int, rng: np.random.Generator) -> Float32:
+    """Unit directions [N,K,3] into the scene, from the eyes or all around."""
+    away = np.asarray(rng.normal(size=(len(points), views, 3)))
     if eyes is not None:
-        away = np.asarray(points[:, None] - eyes[chance.integers(0, len(eyes), (len(points), views))])
+        away = np.asarray(points[:, None] - eyes[rng.integers(0, len(eyes), (len(points), views))])
     return (away / np.linalg.norm(away, axis=-1, keepdims=True)).astype(np.float32)
 
 
-def _fit(colours: Float32, along: Float32, gradient: Float32, degree: int) -> Float32:
-    """Coefficients [N,(degree+1)^2,3] of colours [N,K,3] seen along directions [N,K,3]."""
-    n, views, _ = along.shape
-    basis = spherical_harmonics.sh_basis(along.reshape(-1, 3), degree).reshape(n, views, -1)
-    weight = np.where(np.einsum("nkc,nc->nk", along, gradient) >= 0.0, 1.0, BACK).astype(np.float32)
+def _fit_harmonics(colors: Float32, directions: Float32, gradient: Float32, degree: int) -> Float32:
+    """Coefficients [N,(degree+1)^2,3] of colors [N,K,3] along directions [N,K,3]."""
+    n, views, _ = directions.shape
+    basis = spherical_harmonics.sh_basis(directions.reshape(-1, 3), degree).reshape(n, views, -1)
+    weight = np.where(np.einsum("nkc,nc->nk", directions, gradient) >= 0.0, 1.0, BACK_FACE_WEIGHT).astype(
+        np.float32
+    )
     weighted = basis * weight[..., None]
-    ridge = np.full(basis.shape[2], RIDGE * views, np.float32)
+    ridge = np.full(basis.shape[2], RIDGE_WEIGHT * views, np.float32)
     ridge[0] = 1e-6
     normal = np.einsum("nki,nkj->nij", weighted, basis) + np.diag(ridge)
-    right = np.einsum("nki,nkc->nic", weighted, colours - 0.5)
+    right = np.einsum("nki,nkc->nic", weighted, colors - 0.5)
     return np.linalg.solve(normal, right).astype(np.float32)
 
 
@@ -360,7 +369,7 @@ def _plane(shape: tuple[int, ...], index: int) -> AnyArray:
     return np.stack([np.full(j.size, index), j.ravel(), k.ravel()], axis=1)
 
 
-def _reported(count: int, report: Callable[[float], None]) -> Iterator[int]:
+def _report_each(count: int, report: Callable[[float], None]) -> Iterator[int]:
     for index in range(count):
         yield index
         report((index + 1) / count)

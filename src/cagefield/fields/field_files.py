@@ -1,4 +1,4 @@
-"""Field files: safetensors with the kind of field and the version of its layout in the header."""
+"""Field files: safetensors with the kind of field and its format version in the header."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from cagefield.files.memory import lacking_memory
 from cagefield.files.safe_open import UnreadableError, check_regular, open_regular
 
 
-def kind_of(path: str | Path) -> str | None:
-    """The kind of field that the header of a field file names; None where it names none.
+def read_field_kind(path: str | Path) -> str | None:
+    """Kind of field in the header of a field file; None for a header without kind.
 
     Raises:
-        FieldError: the file is missing or cannot be read.
+        FieldError: the file is missing or unreadable.
     """
     with _opened(path) as (_, metadata, _):
         return metadata.get("kind")
@@ -32,11 +32,11 @@ def kind_of(path: str | Path) -> str | None:
 def read_tensors(
     path: str | Path, kind: str, version: str, cure: str
 ) -> tuple[dict[str, str], dict[str, Any]]:
-    """(header, tensors by name) of a field file; `cure` says where a file that is not there comes from.
+    """(header, tensors by name) of a field file; `cure` tells where a missing file comes from.
 
     Raises:
-        FieldError: the file is missing, truncated, of another kind or of a newer version, or has a tensor
-            of a type that is not read.
+        FieldError: the file is missing, truncated, of another kind or a newer version, or has a tensor of an
+            unsupported type.
     """
     if not Path(path).exists():
         raise FieldError(f"{path}: no such field file; {cure}")
@@ -60,7 +60,7 @@ def read_tensors(
 
 @contextmanager
 def _opened(path: str | Path) -> Iterator[tuple[BinaryIO, dict[str, str], dict[str, Tensor]]]:
-    """(open file, its notes, its tensors); what goes wrong within is a FieldError that names it."""
+    """(open file, its metadata, its tensors); errors within the context become FieldErrors."""
     try:
         with open_regular(path) as file:
             if (lacking := lacking_memory(check_regular(path))) is not None:
@@ -79,17 +79,17 @@ def _opened(path: str | Path) -> Iterator[tuple[BinaryIO, dict[str, str], dict[s
 
 
 def write_tensors(path: str | Path, tensors: Mapping[str, Any], header: dict[str, str]) -> None:
-    """Writes a field file, which others may read as they may any new file; its folder must exist.
+    """Write a field file with default permissions; its folder must exist.
 
     Raises:
-        OSError: it cannot be written; names the file, and what was there is as it was.
+        OSError: the file cannot be written; the message names it, and an existing file stays unchanged.
     """
     from safetensors import SafetensorError
     from safetensors.numpy import save_file
 
     arrays = {name: np.ascontiguousarray(values) for name, values in tensors.items()}
-    # Some file systems miss room only when a file is closed, and safetensors does not ask then: a handle that
-    # is open meanwhile is told.
+    # Some file systems report a full disk only when a file is closed, which safetensors does not check: a
+    # second open handle gets the error.
     with replaced_file(Path(path), parents=False) as draft, draft.open("r+b") as known:
         try:
             save_file(arrays, draft, header)
@@ -99,7 +99,7 @@ def write_tensors(path: str | Path, tensors: Mapping[str, Any], header: dict[str
 
 
 def _system_error(error: Exception) -> OSError:
-    """What the system refused, of which safetensors has the number in its text alone."""
+    """OSError of a failed write, whose number safetensors gives only in its message."""
     found = re.search(r"\(os error (\d+)\)", str(error))
     number = int(found.group(1)) if found else errno.EIO
     return OSError(number, os.strerror(number) if found else " ".join(str(error).split()))

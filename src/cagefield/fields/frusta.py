@@ -1,4 +1,4 @@
-"""Which points of an unbounded scene its photos can have shown."""
+"""Visibility of points in the frusta of cameras."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera
 
-MARGIN = 0.05
-"""A picture reaches this share of its size over its edges here, for what is interpolated there."""
+IMAGE_MARGIN_SHARE = 0.05
+"""Margin around an image, relative to its size, for interpolation at its edges."""
 
 
 def in_frusta(
-    cameras: Sequence[Camera], points: NDArray[Any], near: float = 0.0, least: int = 1
+    cameras: Sequence[Camera], points: NDArray[Any], near: float = 0.0, min_views: int = 1
 ) -> NDArray[np.bool_]:
-    """True [N] where a point [N,3] lies in the pictures of `least` cameras, at a depth of `near` or more.
+    """Mask [N] of points [N,3] within the images of `min_views` cameras, at a depth of at least `near`.
 
-    What is in between is not considered.
+    Occlusion is ignored.
     """
-    wanted = np.full(len(points), least)
+    missing_views = np.full(len(points), min_views)
     for camera in cameras:
-        left = np.flatnonzero(wanted > 0)
-        positions, depth = camera.project(points[left])
+        rows = np.flatnonzero(missing_views > 0)
+        positions, depth = camera.project(points[rows])
         size = np.array([camera.width, camera.height])
         with np.errstate(invalid="ignore"):
-            inside = np.abs(positions / size - 0.5).max(axis=1) <= 0.5 + MARGIN
-        wanted[left] -= inside & (depth > 0.0) & (depth >= near)
-    return wanted <= 0
+            inside = np.abs(positions / size - 0.5).max(axis=1) <= 0.5 + IMAGE_MARGIN_SHARE
+        missing_views[rows] -= inside & (depth > 0.0) & (depth >= near)
+    return missing_views <= 0

@@ -1,10 +1,10 @@
-"""Surfaces of voxel fields as meshes: marching cubes on the density, coloured by the field's harmonics.
+"""Meshes of voxel fields: marching cubes on the density, with colors of the field's harmonics.
 
-The surface is where a voxel takes half of the light: sigma = ln 2 / edge. Each vertex has the normal of the
-density there and the colour that the field shows along it, seen from outside.
+The surface is the level set sigma = ln 2 / edge, where a voxel absorbs half of the light. Each vertex has the
+density's normal, and the field's color along the normal, seen from outside.
 
 Source: Lewiner et al., "Efficient Implementation of Marching Cubes' Cases with Topological Guarantees"
-(2003), as scikit-image has it.
+(2003), implemented by scikit-image.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from cagefield.errors import FieldError
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.typing import Float32
 
-HALF = float(np.log(2.0))
-"""Optical depth of a voxel that the surface goes through."""
+SURFACE_OPTICAL_DEPTH = float(np.log(2.0))
+"""Optical depth of a voxel at the surface."""
 
-BLOCK = 1 << 18
-"""Vertices that are coloured at a time."""
+BLOCK_VERTICES = 1 << 18
+"""Number of vertices colored at a time."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles in world units.
+    """Triangle mesh in world units.
 
-    positions [V,3] float32; normals [V,3] float32, unit, outwards; rgb [V,3] float32 in [0,1];
+    positions [V,3] float32; normals [V,3] float32, unit, outward; rgb [V,3] float32 in [0,1];
     faces [F,3] int32, counter-clockwise seen from outside.
     """
 
@@ -38,8 +38,8 @@ class Mesh:
     rgb: Float32
     faces: NDArray[np.int32]
 
-    def kept(self, mask: NDArray[np.bool_]) -> Mesh:
-        """The faces whose vertices are all kept [V], and their vertices."""
+    def select_vertices(self, mask: NDArray[np.bool_]) -> Mesh:
+        """Mesh of the faces whose vertices are all in `mask` [V]."""
         faces = self.faces[mask[self.faces].all(axis=1)]
         used = np.unique(faces)
         number = np.zeros(len(self.positions), np.int32)
@@ -47,11 +47,11 @@ class Mesh:
         return Mesh(self.positions[used], self.normals[used], self.rgb[used], number[faces])
 
 
-def mesh_of(field: VoxelField, level: float | None = None) -> Mesh:
-    """The field's surface where its density is `level`, per world unit; see the module where left out.
+def extract_mesh(field: VoxelField, level: float | None = None) -> Mesh:
+    """Level set of the field's density at `level` per world unit; None takes ln 2 / edge.
 
     Raises:
-        FieldError: scikit-image is not installed, a contracted field, one without a surface.
+        FieldError: scikit-image is missing, or a contracted field, or one without a surface.
     """
     try:
         from skimage.measure import marching_cubes
@@ -62,8 +62,8 @@ def mesh_of(field: VoxelField, level: float | None = None) -> Mesh:
     if field.contracted:
         raise FieldError("a contracted field is no even grid; bake its box of interest first")
     edges = field.voxel_size
-    level = HALF / float(edges.min()) if level is None else level
-    # A frame of empty vertices closes what the grid's sides cut.
+    level = SURFACE_OPTICAL_DEPTH / float(edges.min()) if level is None else level
+    # A border of empty vertices closes the surface at the grid's sides.
     density = np.zeros(tuple(n + 2 for n in field.resolution), np.float32)
     i, j, k = np.unravel_index(field.vertices, field.resolution)
     density[i + 1, j + 1, k + 1] = field.density
@@ -75,8 +75,8 @@ def mesh_of(field: VoxelField, level: float | None = None) -> Mesh:
     positions = (vertices - edges + field.grid_bounds[0]).astype(np.float32)
     normals = np.ascontiguousarray(normals, np.float32)
     rgb = np.empty_like(positions)
-    for start in range(0, len(positions), BLOCK):
-        rows = slice(start, start + BLOCK)
+    for start in range(0, len(positions), BLOCK_VERTICES):
+        rows = slice(start, start + BLOCK_VERTICES)
         rgb[rows] = field(positions[rows], -normals[rows])[1]
-    # Its faces turn the other way.
+    # The faces of scikit-image have the opposite orientation.
     return Mesh(positions, normals, rgb, np.ascontiguousarray(faces[:, ::-1], np.int32))

@@ -1,5 +1,4 @@
-"""The networks of a NeRF as arrays: layers, and how they fit together; see `fields.nerf_field` for the
-notation."""
+"""Networks of a NeRF as arrays of layers; `fields.nerf_field` has the notation."""
 
 from __future__ import annotations
 
@@ -12,13 +11,13 @@ import numpy as np
 from cagefield.errors import FieldError
 from cagefield.typing import Array, Float32
 
-MAX_FREQUENCIES = 32
-"""More octaves than float32 can tell apart are a misread shape."""
+MAX_OCTAVES = 32
+"""Maximum number of octaves; more exceed float32 and indicate a misread shape."""
 
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """An affine layer W x + b: weight [out,in] and bias [out] float32, with a name for messages."""
+    """Affine layer W x + b: weight [out,in] and bias [out] float32, with a name for messages."""
 
     weight: Float32
     bias: Float32
@@ -53,19 +52,20 @@ class Linear:
 
 @dataclass(frozen=True, eq=False)
 class Mlp:
-    """One network; its shape is what the weights say.
+    """Network, whose shape follows from the weights.
 
     Attributes:
-        trunk: layers of any width; a layer whose input is wider than the output before it by the position's
-            encoding sees that too, encoding first.
+        trunk: layers of any width; a layer whose input is wider than the previous output by the position's
+            encoding also takes the encoding, as its first inputs.
         density: one output.
         rgb: three outputs.
-        feature: between trunk and view branch, None without one.
-        view: layers that see (feature, direction's encoding) first; empty where colour is the trunk's.
+        feature: layer between trunk and view branch, None without one.
+        view: layers of the view branch, the first with input (feature, direction's encoding); empty where the
+            trunk gives the color.
         rectified_feature: True where a ReLU follows `feature`.
 
     Raises:
-        FieldError: layers that do not fit together; the message names the tensor.
+        FieldError: layers of mismatching shapes; the message names the tensor.
     """
 
     trunk: tuple[Linear, ...]
@@ -105,12 +105,12 @@ class Mlp:
 
     @property
     def view_encoding(self) -> tuple[int, bool] | None:
-        """(octaves, whether the direction itself comes first), or None where colour has no view branch."""
+        """(octaves, whether the direction itself comes first), or None without a view branch."""
         return None if self.feature is None else _encoding(self.view[0].inputs - self.feature.outputs)
 
     @property
     def skips(self) -> tuple[bool, ...]:
-        """Per trunk layer: whether it sees the position's encoding beside the layer before it."""
+        """Flags per trunk layer: whether its input includes the position's encoding."""
         return (
             False,
             *(
@@ -120,7 +120,7 @@ class Mlp:
         )
 
     def layers(self) -> Iterator[tuple[str, Linear]]:
-        """(name, layer) of all layers: trunk.0, ..., density, feature, view.0, ..., rgb."""
+        """Yield (name, layer) of all layers: trunk.0, ..., density, feature, view.0, ..., rgb."""
         for index, layer in enumerate(self.trunk):
             yield f"trunk.{index}", layer
         yield "density", self.density
@@ -139,7 +139,7 @@ class Mlp:
 
 
 class NerfParameters(Protocol):
-    """The attributes of a `NerfField`; see there."""
+    """Protocol of `NerfField`'s attributes."""
 
     @property
     def coarse(self) -> Mlp: ...
@@ -162,12 +162,12 @@ class NerfParameters(Protocol):
 
 
 def _encoding(size: int) -> tuple[int, bool]:
-    """(octaves, input included) of an encoding of three coordinates with so many values."""
+    """(octaves, input included) of an encoding of three coordinates with `size` values."""
     return size // 6, size % 6 == 3
 
 
 def _check_encoding(layer: Linear, size: int) -> None:
-    if size < 3 or size % 3 or size // 6 > MAX_FREQUENCIES:
+    if size < 3 or size % 3 or size // 6 > MAX_OCTAVES:
         raise FieldError(
             f"{layer.name}.weight is {list(layer.weight.shape)}: {size} of its inputs would be an encoding, "
             "which has 3 + 6 L or 6 L values"

@@ -1,19 +1,19 @@
-"""NerfField: the original NeRF, a coarse and a fine MLP over positional encodings.
+"""Original NeRF: a coarse and a fine MLP over positional encodings.
 
-Notation: gamma_L(x) = (x, sin x, cos x, sin 2x, cos 2x, ..., sin 2^(L-1) x, cos 2^(L-1) x); x is left out of
-networks that were built without it. A network is
+Notation: gamma_L(x) = (x, sin x, cos x, sin 2x, cos 2x, ..., sin 2^(L-1) x, cos 2^(L-1) x); some networks
+omit x. A network is
 
     h = relu(W_k h + b_k) along the trunk, from h = gamma(p); a layer with a skip sees (gamma(p), h)
     sigma = relu(density(h)),  rgb = sigmoid(rgb(relu(view(feature(h), gamma(d)))))
 
-with sigma per unit of the space that the network was trained in. With `ndc`, that space is the normalised
-device coordinates of a forward-facing capture: cameras look along -z, the near plane is z = -1, and
+with sigma per unit of the network's training space. With `ndc`, this space is the normalized device
+coordinates of a forward-facing capture: cameras look along -z, the near plane is z = -1, and
 
     ndc(p) = (-x / (a z), -y / (b z), 1 + 2/z),   a, b = width/2f, height/2f
 
 so that sigma per world unit along d is the network's times |J_ndc d|, and 0 in front of the near plane.
 
-The arrays are numpy's; PyTorch is imported when the field is first evaluated.
+Arrays are NumPy's; the first evaluation imports PyTorch.
 
 Source: Mildenhall et al., "NeRF" (2020), section 5 and appendix C (NDC).
 """
@@ -37,20 +37,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class NerfField:
-    """The original NeRF (canonical space, world units), with the way its rays are sampled.
+    """Original NeRF (canonical space, world units), with the sampling of its rays.
 
     Attributes:
-        coarse: the network that places the samples; also the field where `fine` is None.
-        fine: the field.
-        bounds: [2,3] the box worth baking and sampling.
-        near, far: depth along the camera's axis at which sampling starts and ends; 0 and 1 with `ndc`.
-        samples: (coarse, further fine ones) on each ray.
+        coarse: network that places the samples; also the field where `fine` is None.
+        fine: network of the field.
+        bounds: [2,3] box to bake and to sample.
+        near, far: depth along the camera's axis of the first and last sample; 0 and 1 with `ndc`.
+        samples: (coarse, additional fine) samples of each ray.
         lindisp: coarse samples even in 1/depth instead of depth.
-        ndc: (width/2f, height/2f) for a network trained in normalised device coordinates.
-        bounded: the field is empty outside `bounds`, and its networks are not asked there.
+        ndc: (width/2f, height/2f) for a network trained in normalized device coordinates.
+        bounded: the field is empty outside `bounds`, where its networks are not evaluated.
 
     Raises:
-        FieldError: impossible bounds, depths or numbers of samples.
+        FieldError: invalid bounds, depths or numbers of samples.
     """
 
     coarse: Mlp
@@ -86,7 +86,7 @@ class NerfField:
 
     @cached_property
     def torch(self) -> TorchNerf:
-        """The same field in PyTorch, on the compute device.
+        """PyTorch version of the field, on the compute device.
 
         Raises:
             FieldError: PyTorch is not installed.
@@ -110,6 +110,7 @@ class NerfField:
     def seen_along(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:
         """(sigma [N], rgb [N,K,3]) at positions [N,3] along K directions each, viewdirs [N,K,3].
 
-        The trunk runs once for each position; sigma (which with `ndc` depends on direction) is the mean.
+        The trunk is evaluated once per position; sigma, which depends on the direction with `ndc`, is the
+        mean.
         """
         return self.torch.numpy_views(positions, viewdirs)

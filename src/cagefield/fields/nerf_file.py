@@ -1,4 +1,4 @@
-"""A NerfField as a safetensors file: the weights by name, the rest as JSON in the header."""
+"""Safetensors files of a NerfField: the weights by name, the options as JSON in the header."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _OPTIONS = ("near", "far", "samples", "lindisp", "ndc", "bounded")
 
 
 def save_nerf(field: NerfField, path: str | Path) -> None:
-    """Writes the field to a safetensors file (float32); the folder must exist."""
+    """Write the field to a safetensors file (float32); the folder must exist."""
     networks = {"coarse": field.coarse, "fine": field.fine}
     state = {}
     for part, network in networks.items():
@@ -35,11 +35,11 @@ def save_nerf(field: NerfField, path: str | Path) -> None:
 
 
 def load_nerf(path: str | Path) -> NerfField:
-    """The field in a safetensors file; PyTorch is not needed to read it.
+    """NerfField of a safetensors file; does not need PyTorch.
 
     Raises:
-        FieldError: the file is missing, truncated, of another kind or newer than this version, or its tensors
-            do not fit together.
+        FieldError: the file is missing, truncated, of another kind or a newer version, or has tensors of
+            mismatching shapes.
     """
     cure = "copy it back or import the checkpoint again"
     metadata, tensors = read_tensors(path, KIND, FORMAT_VERSION, cure)

@@ -10,7 +10,7 @@ With d = (x, y, z) a unit direction, the (L+1)^2 values are
         C4[4] (8 z^4 - 24 z^2 s + 3 s^2), C4[5] xz (4 z^2 - 3 s), C4[6] (x^2 - y^2) (6 z^2 - s),
         C4[7] xz (x^2 - 3 y^2), C4[8] (x^4 - 6 x^2 y^2 + y^4), with s = x^2 + y^2
 They are orthonormal over the sphere: the integral of Y_i Y_j is 1 for i = j, else 0. The order is
-m = -l..l; the Condon-Shortley phase is kept, so odd m have the opposite sign of tables without it.
+m = -l..l; the Condon-Shortley phase is included, so odd m have the opposite sign of tables without it.
 
 Source: Ramamoorthi and Hanrahan 2001; constants as in PlenOctrees (Yu et al. 2021), which has all five
 degrees, and 3DGS (Kerbl et al. 2023).
@@ -26,9 +26,9 @@ import numpy.typing as npt
 from cagefield.errors import FieldError
 
 MAX_DEGREE: Final = 4
-"""The highest degree there is: that of .spz files."""
+"""Maximum degree: that of .spz files."""
 MAX_TERMS: Final = (MAX_DEGREE + 1) ** 2
-"""Harmonics up to the highest degree."""
+"""Number of harmonics up to the maximum degree."""
 C0: Final = 0.28209479177387814
 C1: Final = 0.4886025119029199
 C2: Final = (
@@ -63,9 +63,9 @@ C4: Final = (
 def sh_basis(viewdirs: npt.ArrayLike, degree: int) -> npt.NDArray[np.floating[Any]]:
     """Values [N,(degree+1)^2] of the harmonics at unit directions `viewdirs` [N,3].
 
-    The oracle of `rendering.voxels.kernels.grid.sh_basis`.
+    Oracle of `rendering.voxels.kernels.grid.sh_basis`.
 
-    float32 in, float32 out; anything else gives float64. Directions are not normalised here.
+    float32 directions give float32, others float64. Directions are not normalized.
 
     Raises FieldError for a degree outside 0..MAX_DEGREE or directions of another shape.
     """
@@ -111,10 +111,10 @@ def sh_basis(viewdirs: npt.ArrayLike, degree: int) -> npt.NDArray[np.floating[An
     return values
 
 
-def brightened(
+def scale_sh_colors(
     coefficients: npt.NDArray[np.float32], gains: npt.NDArray[np.floating[Any]]
 ) -> npt.NDArray[np.float32]:
-    """Coefficients [N,K,3] of colours multiplied by gains [N,3], the 0.5 that is added to them included."""
+    """Coefficients [N,K,3] of colors multiplied by gains [N,3], including the constant 0.5 of colors."""
     out = coefficients * gains[:, None].astype(np.float32)
     out[:, 0] += (0.5 / C0 * (gains - 1.0)).astype(np.float32)
     return out

@@ -1,6 +1,6 @@
 """Rotations of real spherical harmonics: Wigner matrices, in the order and with the signs of `sh`.
 
-A function f(d) = sum_k Y_k(d) c_k on the sphere, turned by R, is f(R^T d). It has harmonics of the same
+A function f(d) = sum_k Y_k(d) c_k on the sphere, rotated by R, is f(R^T d). It has harmonics of the same
 degrees, so c'_l = M_l(R) c_l for each degree l, M_l [2l+1, 2l+1] orthogonal. With fixed directions D and
 A = Y_l(D), M_l(R) = A^-1 Y_l(R^T D): exact, since 2l+1 directions in general position determine the function.
 
@@ -18,49 +18,49 @@ from numpy.typing import NDArray
 from cagefield.fields.sh import sh_basis
 from cagefield.typing import AnyArray, Array
 
-CHUNK = 1 << 16
-"""Sets of coefficients that are turned at a time."""
+CHUNK_ROWS = 1 << 16
+"""Number of coefficient sets rotated at a time."""
 
 
-def rotated_sh(sh: AnyArray, rotations: AnyArray) -> NDArray[np.float32]:
-    """Coefficients [N,K,3] of functions turned by rotations [N,3,3]; exact to rounding, float32."""
+def rotate_sh_each(sh: AnyArray, rotations: AnyArray) -> NDArray[np.float32]:
+    """Coefficients [N,K,3] of functions rotated by one rotation each [N,3,3]; exact to rounding, float32."""
     degree = int(np.sqrt(sh.shape[1])) - 1
-    turned = np.array(sh, np.float32)
-    for first in range(0, len(sh) if degree else 0, CHUNK):
-        here = slice(first, first + CHUNK)
+    rotated = np.array(sh, np.float32)
+    for first in range(0, len(sh) if degree else 0, CHUNK_ROWS):
+        chunk = slice(first, first + CHUNK_ROWS)
         for l in range(1, degree + 1):  # noqa: E741
             rows = slice(l * l, (l + 1) ** 2)
-            turned[here, rows] = wigner_matrices(rotations[here], l) @ sh[here, rows].astype(np.float64)
-    return turned
+            rotated[chunk, rows] = wigner_matrices(rotations[chunk], l) @ sh[chunk, rows].astype(np.float64)
+    return rotated
 
 
-def turned_sh(sh: AnyArray, rotation: AnyArray) -> NDArray[np.float32]:
-    """Coefficients [N,K,3] of functions that are all turned by one rotation [3,3]; exact to rounding."""
-    turned = np.array(sh, np.float32)
+def rotate_sh(sh: AnyArray, rotation: AnyArray) -> NDArray[np.float32]:
+    """Coefficients [N,K,3] of functions rotated by a common rotation [3,3]; exact to rounding."""
+    rotated = np.array(sh, np.float32)
     for l in range(1, int(np.sqrt(sh.shape[1]))):  # noqa: E741
         rows = slice(l * l, (l + 1) ** 2)
         matrix = wigner_matrices(np.asarray(rotation)[None], l)[0].astype(np.float32)
-        turned[:, rows] = np.einsum("jk,nkc->njc", matrix, turned[:, rows])
-    return turned
+        rotated[:, rows] = np.einsum("jk,nkc->njc", matrix, rotated[:, rows])
+    return rotated
 
 
 def wigner_matrices(rotations: AnyArray, degree: int) -> Array:
-    """M_l [N,2l+1,2l+1] of rotations [N,3,3]."""
+    """Wigner matrices M_l [N,2l+1,2l+1] of rotations [N,3,3]."""
     directions, inverse = _directions(degree)
     # R^T d for each of the directions, as rows d^T R
-    turned = directions @ rotations.astype(np.float64)
-    values = sh_basis(turned.reshape(-1, 3), degree)[:, degree**2 :]
+    rotated = directions @ rotations.astype(np.float64)
+    values = sh_basis(rotated.reshape(-1, 3), degree)[:, degree**2 :]
     return np.asarray(inverse @ values.reshape(len(rotations), len(directions), -1))
 
 
 @cache
 def _directions(degree: int) -> tuple[Array, Array]:
-    """(directions D [2l+1,3], inverse of Y_l(D)): of some random ones, those that determine it best."""
-    chance = np.random.default_rng(degree)
-    found = []
+    """(directions D [2l+1,3], inverse of Y_l(D)), the best-conditioned of 200 random sets."""
+    rng = np.random.default_rng(degree)
+    trials = []
     for _ in range(200):
-        d = chance.normal(size=(2 * degree + 1, 3))
+        d = rng.normal(size=(2 * degree + 1, 3))
         d /= np.linalg.norm(d, axis=1, keepdims=True)
-        found.append((float(np.linalg.cond(sh_basis(d, degree)[:, degree**2 :])), d))
-    best = min(found, key=lambda pair: pair[0])[1]
+        trials.append((float(np.linalg.cond(sh_basis(d, degree)[:, degree**2 :])), d))
+    best = min(trials, key=lambda pair: pair[0])[1]
     return best, np.linalg.inv(sh_basis(best, degree)[:, degree**2 :])

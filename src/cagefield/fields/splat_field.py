@@ -1,12 +1,11 @@
-"""SplatField: a mixture of anisotropic 3D Gaussians with spherical-harmonic colour.
+"""Mixture of anisotropic 3D Gaussians with spherical-harmonic color.
 
-Notation: splat n has the mean m, the scales s = exp(log_scales) (standard deviations along its own axes), the
+Notation: splat n has the mean m, the scales s = exp(log_scales) (standard deviations along its axes), the
 rotation R of its unit quaternion (w, x, y, z), hence the covariance C = R diag(s^2) R^T, the opacity o in
-[0, 1] and harmonics k. Its colour seen along d is max(0, 0.5 + sum_l Y_l(d) k_l). A picture of splats shows
+[0, 1] and harmonics k. Its color along d is max(0, 0.5 + sum_l Y_l(d) k_l). An image of splats blends
 each with alpha = o exp(-e^T Q e / 2) at a pixel's offset e from its projected mean, Q the inverse of its
-projected covariance, sorted by depth (`cagefield.rendering.splats.reference_rasterizer`). What the splats
-are at points,
-for code that samples, follows from that: see `cagefield.fields.splat_mixture`.
+projected covariance, sorted by depth (`cagefield.rendering.splats.reference_rasterizer`).
+`cagefield.fields.splat_mixture` derives a density and a color at points, for renderers that sample.
 
 Source: Kerbl et al., "3D Gaussian Splatting for Real-Time Radiance Field Rendering" (2023), equations 1 to 6.
 """
@@ -38,33 +37,34 @@ FORMAT_VERSION = "1"
 Offset: TypeAlias = tuple[float, float, float]
 NO_OFFSET: Offset = (0.0, 0.0, 0.0)
 
-BLOCK = 1 << 16
-"""Splats that are checked at a time."""
+BLOCK_SPLATS = 1 << 16
+"""Number of splats checked at a time."""
 
 
 @dataclass(frozen=True, eq=False)
 class SplatField:
     """3D Gaussian splats (canonical space, world units).
 
-    Arrays that may be written to are copied; read-only ones are taken as they are, and must stay so.
+    Writable arrays are copied; read-only ones are shared and must stay unchanged.
 
     Attributes:
         means: [N,3] float32.
         log_scales: [N,3] float32, natural logarithms of the standard deviations along the splats' axes.
-        quaternions: [N,4] float32, (w, x, y, z), unit: those given are normalised.
+        quaternions: [N,4] float32, (w, x, y, z); normalized on construction.
         opacities: [N] float32, in [0, 1].
-        sh: [N, (degree+1)^2, 3] float32 colour coefficients, degree 0 to `sh.MAX_DEGREE`.
-        antialiased: opacity is scaled so that what a splat adds to a picture does not grow with the filter of
-            .3 pixels^2 that every splat gets (Mip-Splatting's 2D filter).
-        discs: splats are the discs of 2DGS, across their third axes, and pictures show each where the pixels'
-            rays meet it (`cagefield.rendering.splats.reference_discs`).
-        bounds: [2,3] float64: the box of interest; left out, the box of the middle 98 % of the means.
+        sh: [N, (degree+1)^2, 3] float32 color coefficients, degree 0 to `sh.MAX_DEGREE`.
+        antialiased: opacities are scaled so that the pixel filter of .3 pixels^2 does not increase a splat's
+            contribution to an image (Mip-Splatting's 2D filter).
+        discs: splats are the discs of 2DGS, normal to their third axes, rendered by ray-disc intersection
+            (`cagefield.rendering.splats.reference_discs`).
+        bounds: [2,3] float64 box of interest; None takes the box of the central 98 % of the means.
         unbounded: True where splats beyond `bounds` are the background.
-        offset: coordinates of the file that the splats are from, less those of the field: what float32 could
-            not hold of them. Exports add it.
+        offset: coordinates of the source file less those of the field, for coordinates beyond the precision
+        of
+            float32. Exports add the offset.
 
     Raises:
-        FieldError: shapes that do not fit, NaN or infinity, opacities outside [0, 1].
+        FieldError: mismatching shapes, NaN or infinity, opacities outside [0, 1].
     """
 
     means: Float32
@@ -116,7 +116,7 @@ class SplatField:
                 raise FieldError(f"quaternion {bad} of {count} is 0; a rotation has length 1")
             unit[rows] = self.quaternions[rows] / norm
         fix(self, "quaternions", _read_only(unit))
-        bounds = _box_of(self.means) if self.bounds is None else np.asarray(self.bounds, np.float64)
+        bounds = _central_box(self.means) if self.bounds is None else np.asarray(self.bounds, np.float64)
         if bounds.shape != (2, 3) or not np.isfinite(bounds).all() or not (bounds[0] < bounds[1]).all():
             raise FieldError(f"bounds must be 2 finite corners [2,3], lower < upper, got {bounds.tolist()}")
         fix(self, "bounds", _frozen(bounds, np.float64))
@@ -130,12 +130,12 @@ class SplatField:
 
     @property
     def sh_degree(self) -> int:
-        """Degree of the colour's spherical harmonics, 0 to `sh.MAX_DEGREE`."""
+        """Degree of the color's spherical harmonics, 0 to `sh.MAX_DEGREE`."""
         return _SH_SHAPES.index(self.sh.shape[1:])
 
     @property
     def center(self) -> NDArray[np.float64]:
-        """Centre [3] of `bounds`."""
+        """Center [3] of `bounds`."""
         return np.asarray(self.bounds.mean(axis=0))
 
     @property
@@ -145,11 +145,11 @@ class SplatField:
 
     @property
     def sample_spacing(self) -> float:
-        """World length between two samples that miss no detail: what most splats are wide.
+        """World length between samples that resolve all detail: the typical splat width.
 
-        The median of the middle one of the three scales, weighted by opacity, of the splats in `bounds`: the
-        smallest says how thin surfaces are, which is no detail that a picture shows. A thousandth of the
-        largest edge of `bounds` where there are no splats.
+        The opacity-weighted median, over the splats in `bounds`, of the middle of the three scales: the
+        smallest scale is the thickness of surfaces, which images do not resolve. Without splats, a thousandth
+        of the largest edge of `bounds`.
         """
         inside = ((self.means >= self.bounds[0]) & (self.means <= self.bounds[1])).all(axis=1)
         weights = np.where(inside, self.opacities, 0.0).astype(np.float64)
@@ -163,30 +163,30 @@ class SplatField:
     def __call__(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:
         """(sigma [N] per world unit, rgb [N,3]) at canonical positions [N,3] along unit viewdirs [N,3].
 
-        The density whose integral along any ray is what a picture of the splats takes from it; the colours of
-        the splats at a point, weighted by their densities (`cagefield.fields.splat_mixture`).
+        The integral of sigma along any ray gives the opacity of the splats' image; colors are the
+        density-weighted means of the splats at a point (`cagefield.fields.splat_mixture`).
         """
-        sigma, rgb = self.mixture.along(np.asarray(positions), np.asarray(viewdirs)[:, None])
+        sigma, rgb = self.mixture.evaluate(np.asarray(positions), np.asarray(viewdirs)[:, None])
         return sigma[:, 0], np.clip(rgb[:, 0], 0.0, 1.0)
 
     def seen_along(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:
-        """(sigma [N], rgb [N,K,3]) at positions [N,3] along unit viewdirs [N,K,3]; sigma is their mean."""
-        sigma, rgb = self.mixture.along(np.asarray(positions), np.asarray(viewdirs))
+        """(sigma [N], rgb [N,K,3]) at positions [N,3] along unit viewdirs [N,K,3]; sigma is the mean."""
+        sigma, rgb = self.mixture.evaluate(np.asarray(positions), np.asarray(viewdirs))
         return sigma.mean(axis=1), np.clip(rgb, 0.0, 1.0)
 
     def grid_sigma(self, positions: ArrayLike) -> Float32:
-        """The density [N] at positions [N,3] for grids: smoother, the same for all directions."""
+        """Density [N] at positions [N,3] for grids: smoother, and independent of the direction."""
         return self.mixture.grid_sigma(np.asarray(positions))
 
     @cached_property
     def mixture(self) -> SplatMixture:
-        """The splats, ready to be asked at points; made on first use."""
+        """Spatial index of the splats for evaluation at points; built on first use."""
         from cagefield.fields.splat_mixture import SplatMixture
 
-        return SplatMixture.of(self.means, self.log_scales, self.quaternions, self.opacities, self.sh)
+        return SplatMixture.build(self.means, self.log_scales, self.quaternions, self.opacities, self.sh)
 
     def take(self, rows: NDArray[Any]) -> SplatField:
-        """The splats of these rows, or where a mask is True, in the same box."""
+        """Splats of the given rows or mask, with equal bounds."""
         return SplatField(
             _read_only(self.means[rows]),
             _read_only(self.log_scales[rows]),
@@ -201,7 +201,7 @@ class SplatField:
         )
 
     def save(self, path: str | Path) -> None:
-        """Writes the field to a safetensors file (float32); the folder must exist."""
+        """Write the field to a safetensors file (float32); the folder must exist."""
         tensors = {name: getattr(self, name) for name in (*_TENSORS, "bounds")}
         header = {
             "kind": "SplatField",
@@ -216,10 +216,10 @@ class SplatField:
 
     @classmethod
     def load(cls, path: str | Path) -> SplatField:
-        """The field in a safetensors file.
+        """SplatField of a safetensors file.
 
         Raises:
-            FieldError: the file is missing, truncated, of another kind or newer than this version.
+            FieldError: the file is missing, truncated, of another kind or a newer version.
         """
         cure = "train one with `cagefield train DATA -o SCENE --field splat`"
         metadata, tensors = read_tensors(path, "SplatField", FORMAT_VERSION, cure)
@@ -245,11 +245,11 @@ _TENSORS = ("means", "log_scales", "quaternions", "opacities", "sh")
 _SH_SHAPES = tuple(((degree + 1) ** 2, 3) for degree in range(MAX_DEGREE + 1))
 
 
-def _box_of(means: Float32) -> NDArray[np.float64]:
-    """The box of the middle 98 % of the means, never flat; the unit cube where there are none."""
+def _central_box(means: Float32) -> NDArray[np.float64]:
+    """Box [2,3] of the central 98 % of the means, never flat; the cube [-1, 1]^3 without splats."""
     if not len(means):
         return np.array([[-1.0] * 3, [1.0] * 3])
-    # One axis at a time: large fields are not copied as a whole.
+    # One axis at a time, to avoid a copy of a large field.
     low, high = np.stack([np.quantile(axis.astype(np.float64), (0.01, 0.99)) for axis in means.T], axis=1)
     least = max(1e-3 * float((high - low).max()), 1e-6)
     flat = high - low < least
@@ -257,13 +257,13 @@ def _box_of(means: Float32) -> NDArray[np.float64]:
 
 
 def _blocks(count: int) -> Iterator[slice]:
-    """Rows of `count`, so many at a time that what is worked out from them takes little memory."""
-    for start in range(0, count, BLOCK):
-        yield slice(start, min(start + BLOCK, count))
+    """Slices of at most BLOCK_SPLATS rows, which bound the memory of intermediate results."""
+    for start in range(0, count, BLOCK_SPLATS):
+        yield slice(start, min(start + BLOCK_SPLATS, count))
 
 
 def _frozen(values: ArrayLike, dtype: Any) -> NDArray[Any]:
-    """The values, read-only; copied unless they are that already."""
+    """Read-only values; copied unless they are read-only already."""
     if (
         isinstance(values, np.ndarray)
         and values.dtype == dtype

@@ -1,21 +1,21 @@
-"""Splats as a density and a colour at points: what a ray through them must integrate to, told exactly.
+"""Density and color of splats at points, consistent with the opacity of a splat image along every ray.
 
 Notation: splat n has the mean m, the covariance C = R diag(s^2) R^T, the opacity o and the Gaussian
 G(p) = exp(-(p - m)^T C^-1 (p - m) / 2). Along a ray with direction d, G falls off as a normal distribution of
-standard deviation s_d = (d^T C^-1 d)^(-1/2) from its largest value g on the ray. A picture of splats takes
-the opacity o g from that ray (EWA splatting: exact for parallel rays, and for a perspective camera as nearly
-as a splat is small against its distance).
+standard deviation s_d = (d^T C^-1 d)^(-1/2) from its largest value g on the ray. A splat image has the
+opacity o g on that ray (EWA splatting: exact for parallel rays; for a perspective camera the error is small
+for splats that are small relative to their distance).
 
-The density is the one whose integral along every ray is that opacity: with -ln(1 - o g) = sum_k (o g)^k / k
+The density follows from this opacity on every ray: with -ln(1 - o g) = sum_k (o g)^k / k
 and the integral of G^k along the ray, g^k sqrt(2 pi / k) s_d,
 
     sigma_n(p, d) = Li_1/2(o G(p)) / (sqrt(2 pi) s_d),    Li_1/2(z) = sum_k z^k / sqrt(k)
 
 has the integral sum_k (o g)^k / k, hence 1 - exp(-integral of sigma_n) = o g: for all opacities below 1, all
-shapes, all directions and at any distance from the mean. (A density proportional to G itself would be right
-at the mean alone, and too wide around it: by half at o = .9.) Densities of several splats add up, as their
-transmittances multiply: a ray loses the same in both, whatever their order. The colour at a point is that of
-the splats there, weighted by their densities.
+shapes, all directions and at any distance from the mean. (A density proportional to G itself is
+correct only at the mean, and too wide around it: by half at o = .9.) Densities of several splats add up, as
+their transmittances multiply, in any order. The color at a point is the density-weighted mean of the splats'
+colors.
 
 For grids, which sample and interpolate, `grid_sigma` differs in two ways. Li_1/2 has a sharp peak where o is
 near 1; along the thinnest axis, with u the position on it in units of its scale, the profile is normal
@@ -23,12 +23,14 @@ instead, with the same integral,
 
     sigma_n(p) = -ln(1 - o g) exp(-u^2 / 2) / (sqrt(2 pi) s_d),    g = G(p) exp(u^2 / 2),
 
-whose samples a distance of 2 scales apart sum up to that integral within 2 %. And it depends on no direction:
-1 / s_d is its root mean square over all, sqrt((1/s_1^2 + 1/s_2^2 + 1/s_3^2) / 3). On a layer of flat splats
-that is .58 of what it is face on. There a ray at an angle loses as much as one that is face on, but in a grid
-1 / cos as much: half is right on average over what is seen.
+whose samples at a distance of 2 scales sum up to that integral within 2 %. Second, it does not depend on the
+direction: 1 / s_d is replaced by its root mean square over directions, sqrt((1/s_1^2 + 1/s_2^2 + 1/s_3^2) /
+3). On a layer of flat splats
+this is .58 of the value along the normal. There the opacity of a ray does not depend on its angle, but in a grid it
+grows as 1 / cos: half is right on average over visible directions.
 
-A splat counts where o G is at least `LEAST`; its opacity is at most `MAX_OPACITY`, as in pictures.
+A splat contributes where o G is at least `MIN_RAY_OPACITY`; its opacity is at most `MAX_OPACITY`, as in
+images.
 """
 
 from __future__ import annotations
@@ -48,26 +50,26 @@ from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.typing import Float32
 
 MAX_OPACITY = 0.99
-"""Highest opacity of a splat, in pictures as here, where an opaque one would have no finite density."""
+"""Maximum opacity of a splat, as in images; an opaque splat has no finite density."""
 
-LEAST = 1e-3
-"""Opacity on a ray that is left out, splat by splat."""
+MIN_RAY_OPACITY = 1e-3
+"""Minimum opacity of a splat on a ray; smaller contributions are left out."""
 
-FINEST = 2.0**-20
-"""Smallest cells against the extent of all splats: coordinates of cells stay small."""
+MIN_CELL_SHARE = 2.0**-20
+"""Minimum cell size, relative to the extent of all splats; it bounds cell coordinates."""
 
-BLOCK = 1 << 13
-"""Points that a thread asks for at a time."""
+BLOCK_POINTS = 1 << 13
+"""Number of points that a thread evaluates at a time."""
 
 
 @dataclass(frozen=True, eq=False)
 class SplatMixture:
-    """The splats of a field in a hash table of cells, level by level: large splats in large cells.
+    """Splats of a field in a hash table of cells, level by level: large splats in large cells.
 
     A splat whose box has the largest half extent r is in all the cells of size 2^l in [r, 2r) that it
-    overlaps, 27 at most. A point looks into one cell of each level. `packed`, `layers` (for `grid_sigma`: the
-    thinnest axis over its scale, and 1 / (sqrt(2 pi) s_d)) and `harmonics` have a row for each splat that is
-    seen; `cells` are the arrays of the table, as `cagefield.fields.kernels.splat_mixture` takes them.
+    overlaps, 27 at most. A query looks into one cell per level. `packed`, `layers` (for `grid_sigma`: the
+    thinnest axis over its scale, and 1 / (sqrt(2 pi) s_d)) and `harmonics` have a row per visible splat;
+    `cells` are the arrays of the table, as in `cagefield.fields.kernels.splat_mixture`.
     """
 
     packed: Float32
@@ -76,36 +78,36 @@ class SplatMixture:
     cells: tuple[NDArray[Any], ...]
 
     @classmethod
-    def of(
+    def build(
         cls, means: Float32, log_scales: Float32, quaternions: Float32, opacities: Float32, sh: Float32
     ) -> SplatMixture:
-        """The mixture of splats; the arrays are those of a `SplatField`."""
+        """Mixture of splats, from the arrays of a `SplatField`."""
         from cagefield.fields.kernels import splat_mixture as kernels
 
-        seen = np.flatnonzero(opacities > LEAST)
-        opacity = np.minimum(opacities[seen].astype(np.float64), MAX_OPACITY)
-        scales = np.exp(log_scales[seen].astype(np.float64))
-        rotations = rotation_matrices(quaternions[seen].astype(np.float64))
-        end = 2.0 * np.log(opacity / LEAST)
+        visible = np.flatnonzero(opacities > MIN_RAY_OPACITY)
+        opacity = np.minimum(opacities[visible].astype(np.float64), MAX_OPACITY)
+        scales = np.exp(log_scales[visible].astype(np.float64))
+        rotations = rotation_matrices(quaternions[visible].astype(np.float64))
+        end = 2.0 * np.log(opacity / MIN_RAY_OPACITY)
         half = np.sqrt(end[:, None] * np.einsum("nij,nj->ni", rotations**2, scales**2))
-        packed = np.empty((len(seen), kernels.PACKED), np.float32)
+        packed = np.empty((len(visible), kernels.PACKED_FLOATS), np.float32)
         packed[:, :9] = (rotations.transpose(0, 2, 1) / scales[:, :, None]).reshape(-1, 9)
-        packed[:, 9:12] = means[seen]
+        packed[:, 9:12] = means[visible]
         packed[:, 12] = -np.log(opacity)
         packed[:, 13] = end
         thinnest = np.argmin(scales, axis=1)
-        layers = np.empty((len(seen), 4), np.float32)
-        layers[:, :3] = packed[:, :9].reshape(-1, 3, 3)[np.arange(len(seen)), thinnest]
+        layers = np.empty((len(visible), 4), np.float32)
+        layers[:, :3] = packed[:, :9].reshape(-1, 3, 3)[np.arange(len(visible)), thinnest]
         layers[:, 3] = np.sqrt((scales**-2.0).mean(axis=1) / (2.0 * np.pi))
-        largest = np.maximum(half.max(axis=1), FINEST * _extent(means[seen]))
+        largest = np.maximum(half.max(axis=1), MIN_CELL_SHARE * _extent(means[visible]))
         exponents, levels = np.unique(np.ceil(np.log2(largest)), return_inverse=True)
         sizes = np.exp2(exponents)
-        # Neighbours in memory are neighbours in space.
-        order = np.lexsort((*np.floor(means[seen] / sizes[levels][:, None]).T, levels))
+        # Sort for locality: neighbors in space are neighbors in memory.
+        order = np.lexsort((*np.floor(means[visible] / sizes[levels][:, None]).T, levels))
         packed, half, levels = packed[order], half[order], levels[order]
 
-        nothing = np.empty(0, np.int64), np.empty(0, np.int32)
-        count = kernels.overlapped_cells(packed, half, levels, sizes, *nothing)
+        no_output = np.empty(0, np.int64), np.empty(0, np.int32)
+        count = kernels.overlapped_cells(packed, half, levels, sizes, *no_output)
         keys, ids = np.empty(count, np.int64), np.empty(count, np.int32)
         kernels.overlapped_cells(packed, half, levels, sizes, keys, ids)
         by_key = np.argsort(keys, kind="stable")
@@ -117,74 +119,74 @@ class SplatMixture:
         return cls(
             packed,
             layers[order],
-            np.ascontiguousarray(sh[seen[order]]),
+            np.ascontiguousarray(sh[visible[order]]),
             (sizes, table, starts, ends, ids[by_key]),
         )
 
     def grid_sigma(self, positions: NDArray[Any]) -> Float32:
-        """The density for grids [N] at positions [N,3], per world unit."""
+        """Density [N] for grids at positions [N,3], per world unit."""
         from cagefield.fields.kernels import splat_mixture as kernels
 
-        points = _three(positions, "positions")
+        points = _as_points(positions, "positions")
         sigma = np.empty(len(points), np.float32)
 
-        def ask(rows: slice) -> None:
+        def evaluate_rows(rows: slice) -> None:
             kernels.densities(self.packed, self.layers, *self.cells, points[rows], sigma[rows])
 
-        _in_blocks(len(points), ask)
+        _run_in_blocks(len(points), evaluate_rows)
         return sigma
 
-    def along(self, positions: NDArray[Any], viewdirs: NDArray[Any]) -> tuple[Float32, Float32]:
-        """(sigma [N,K], rgb [N,K,3]) at positions [N,3] seen along unit viewdirs [N,K,3].
+    def evaluate(self, positions: NDArray[Any], viewdirs: NDArray[Any]) -> tuple[Float32, Float32]:
+        """(sigma [N,K], rgb [N,K,3]) at positions [N,3] along unit viewdirs [N,K,3].
 
-        Colours have no upper limit, as in pictures before these are clipped.
+        Colors have no upper limit, as in images before clipping.
         """
         from cagefield.fields.kernels import splat_mixture as kernels
 
-        points, along = _three(positions, "positions"), np.ascontiguousarray(viewdirs, np.float32)
-        if along.ndim != 3 or along.shape[0] != len(points) or along.shape[2] != 3:
-            raise FieldError(f"viewdirs must be [{len(points)}, K, 3], got {list(along.shape)}")
-        views = along.shape[1]
+        points, directions = _as_points(positions, "positions"), np.ascontiguousarray(viewdirs, np.float32)
+        if directions.ndim != 3 or directions.shape[0] != len(points) or directions.shape[2] != 3:
+            raise FieldError(f"viewdirs must be [{len(points)}, K, 3], got {list(directions.shape)}")
+        views = directions.shape[1]
         sigma = np.empty((len(points), views), np.float32)
         rgb = np.empty((len(points), views, 3), np.float32)
         degree = int(np.sqrt(self.harmonics.shape[1])) - 1
 
-        def ask(rows: slice) -> None:
-            basis = spherical_harmonics.sh_basis(along[rows].reshape(-1, 3), degree).astype(np.float32)
+        def evaluate_rows(rows: slice) -> None:
+            basis = spherical_harmonics.sh_basis(directions[rows].reshape(-1, 3), degree).astype(np.float32)
             basis = basis.reshape(-1, views, basis.shape[1])
-            kernels.colours(
+            kernels.colors(
                 self.packed,
                 self.harmonics,
                 *self.cells,
                 points[rows],
-                along[rows],
+                directions[rows],
                 basis,
                 sigma[rows],
                 rgb[rows],
             )
 
-        _in_blocks(len(points), ask)
+        _run_in_blocks(len(points), evaluate_rows)
         return sigma, rgb
 
 
 def _extent(means: Float32) -> float:
-    """The largest edge of the box of all means."""
+    """Largest edge of the bounding box of all means."""
     return float((means.max(axis=0) - means.min(axis=0)).max()) if len(means) else 0.0
 
 
-def _three(values: NDArray[Any], name: str) -> Float32:
+def _as_points(values: NDArray[Any], name: str) -> Float32:
     points = np.ascontiguousarray(values, np.float32)
     if points.ndim != 2 or points.shape[1] != 3:
         raise FieldError(f"{name} must be [N,3], got {list(points.shape)}")
     return points
 
 
-def _in_blocks(count: int, ask: Callable[[slice], None]) -> None:
-    """Asks for `count` rows in blocks, on as many threads as there are processors; kernels hold no lock."""
-    blocks = [slice(start, start + BLOCK) for start in range(0, count, BLOCK)]
+def _run_in_blocks(count: int, evaluate_rows: Callable[[slice], None]) -> None:
+    """Evaluate `count` rows in blocks, on all processors; kernels release the GIL."""
+    blocks = [slice(start, start + BLOCK_POINTS) for start in range(0, count, BLOCK_POINTS)]
     if len(blocks) < 2:
         for block in blocks:
-            ask(block)
+            evaluate_rows(block)
         return
     with ThreadPoolExecutor(min(len(blocks), os.cpu_count() or 1)) as pool:
-        list(pool.map(ask, blocks))
+        list(pool.map(evaluate_rows, blocks))

@@ -1,7 +1,7 @@
-"""Reading safetensors files: a header of JSON, and arrays one after another.
+"""Reader of safetensors files: a JSON header, and concatenated arrays.
 
-The library maps a file into memory: where another program cuts it off meanwhile, the process ends at once
-(a bus error). What is read here is an error then.
+The safetensors library maps files into memory: a file truncated by another program then kills the process
+with a bus error. This reader raises an exception instead.
 
 Source: the README of huggingface/safetensors, "Format".
 """
@@ -18,8 +18,8 @@ import numpy as np
 from cagefield.files import json_text
 from cagefield.typing import AnyArray
 
-_MOST_HEADER = 1 << 20
-"""Bytes of a header: a field has some dozens of tensors."""
+_MAX_HEADER_BYTES = 1 << 20
+"""Maximum size of a header; a field has some dozens of tensors."""
 
 _TYPES = {
     "F64": "<f8", "F32": "<f4", "F16": "<f2", "I64": "<i8", "I32": "<i4", "I16": "<i2", "I8": "i1",
@@ -29,7 +29,7 @@ _TYPES = {
 
 @dataclass(frozen=True)
 class Tensor:
-    """An array of a file: its type's name, its shape, and where it begins."""
+    """Array of a file: name of its type, shape, and offset of its first byte."""
 
     kind: str
     shape: tuple[int, ...]
@@ -37,11 +37,11 @@ class Tensor:
 
     @property
     def is_number(self) -> bool:
-        """Whether its type is one of numpy's that is real."""
+        """Whether the type is a real NumPy type."""
         return self.kind in _TYPES
 
     def read(self, file: BinaryIO) -> AnyArray:
-        """Its values. Raises ValueError where the file has become shorter."""
+        """Values of the tensor. Raises ValueError where the file has been truncated."""
         count = math.prod(self.shape)
         file.seek(self.begin)
         values = np.fromfile(file, _TYPES[self.kind], count)
@@ -51,11 +51,11 @@ class Tensor:
 
 
 def read_header(file: BinaryIO) -> tuple[dict[str, str], dict[str, Tensor]]:
-    """(notes, tensors by name) of a file. Raises ValueError where it is damaged."""
+    """(metadata, tensors by name) of a file. Raises ValueError for a damaged one."""
     size = os.fstat(file.fileno()).st_size
     start = file.read(8)
     length = int.from_bytes(start, "little")
-    if len(start) < 8 or length > min(size - 8, _MOST_HEADER):
+    if len(start) < 8 or length > min(size - 8, _MAX_HEADER_BYTES):
         raise ValueError("its header is cut off")
     document = json_text.loads(file.read(length))
     if not isinstance(document, dict):
@@ -64,26 +64,28 @@ def read_header(file: BinaryIO) -> tuple[dict[str, str], dict[str, Tensor]]:
     if not (isinstance(notes, dict) and all(isinstance(value, str) for value in notes.values())):
         raise ValueError("its notes are no texts")
     tensors, end = {}, 0
-    for name, about in sorted(document.items(), key=lambda item: _places(item[1])):
-        begin, end = _checked(about, end)
-        tensors[name] = Tensor(about["dtype"], tuple(about["shape"]), 8 + length + begin)
+    for name, entry in sorted(document.items(), key=lambda item: _offsets(item[1])):
+        begin, end = _check_tensor(entry, end)
+        tensors[name] = Tensor(entry["dtype"], tuple(entry["shape"]), 8 + length + begin)
     if 8 + length + end != size:
         raise ValueError(f"it has {size} bytes, its header says {8 + length + end}")
     return notes, tensors
 
 
-def _places(about: Any) -> list[int]:
-    """Where a tensor begins and ends."""
-    places = about["data_offsets"] if isinstance(about, dict) and "data_offsets" in about else None
-    if not (isinstance(places, list) and len(places) == 2 and all(type(place) is int for place in places)):
-        raise ValueError("a tensor has no place")
-    return places
+def _offsets(entry: Any) -> list[int]:
+    """(begin, end) offsets of a tensor."""
+    offsets = entry["data_offsets"] if isinstance(entry, dict) and "data_offsets" in entry else None
+    if not (
+        isinstance(offsets, list) and len(offsets) == 2 and all(type(offset) is int for offset in offsets)
+    ):
+        raise ValueError("a tensor has no offset")
+    return offsets
 
 
-def _checked(about: dict[str, Any], before: int) -> tuple[int, int]:
-    """A tensor's place, which must begin where the one before ends and be as long as its shape says."""
-    begin, end = _places(about)
-    kind, shape = about.get("dtype"), about.get("shape")
+def _check_tensor(entry: dict[str, Any], before: int) -> tuple[int, int]:
+    """(begin, end) offsets of a tensor, checked against the previous end and the shape."""
+    begin, end = _offsets(entry)
+    kind, shape = entry.get("dtype"), entry.get("shape")
     if not isinstance(kind, str) or not isinstance(shape, list):
         raise ValueError("a tensor has no shape")
     if not all(type(side) is int and 0 <= side <= 2**62 for side in shape) or len(shape) > 32:

@@ -1,8 +1,8 @@
-"""VoxelField: a sparse voxel grid of density and spherical-harmonic colour.
+"""Sparse voxel grid of density and spherical-harmonic color.
 
 Notation: a grid of nx x ny x nz *vertices* spans `bounds`; vertex (i, j, k) has the linear index
-(i*ny + j)*nz + k. Only M vertices are stored; the others are empty (density 0, and their colour counts as
-0.5 grey). Between vertices, density and colour coefficients are interpolated trilinearly:
+(i*ny + j)*nz + k. Only M vertices are stored; the others are empty (density 0, color 0.5 gray). Between
+vertices, density and color coefficients are interpolated trilinearly:
 
     sigma(p) = max(0, sum_v b_v(p) density_v)
     rgb(p, d) = clip(0.5 + sum_l Y_l(d) sum_v b_v(p) sh_v,l , 0, 1)
@@ -29,26 +29,25 @@ from cagefield.fields import sh as spherical_harmonics
 from cagefield.fields.contraction import contract
 from cagefield.fields.field_files import read_tensors, write_tensors
 
-_DENSE_GRID, _SPARSEST = 1 << 27, 1000
-"""Vertices of a grid of which any number may be stored (512 an axis); of a larger one, one in so many."""
+_MAX_DENSE_VERTICES, _MAX_VERTICES_PER_STORED = 1 << 27, 1000
+"""Vertices of a grid without minimum occupancy (512^3), and maximum per stored vertex beyond."""
 FORMAT_VERSION = "1"
 
 
 @dataclass(frozen=True, eq=False)
 class VoxelField:
-    """A sparse voxel grid of density and SH colour over `bounds` (canonical space, world units).
+    """Sparse voxel grid of density and SH color over `bounds` (canonical space, world units).
 
     Attributes:
         bounds: [2,3] float64, lower and upper corner; the box of interest when `contracted`.
         resolution: (nx, ny, nz) vertices along each axis, at least 2 each.
         vertices: [M] int64, strictly increasing linear indices of the stored vertices.
-        density: [M] float32, per world unit; negative values are allowed and interpolate before the clamp
-            at 0.
-        sh: [M, (degree+1)^2, 3] float32 colour coefficients.
+        density: [M] float32, per world unit; may be negative, clamped at 0 after the interpolation.
+        sh: [M, (degree+1)^2, 3] float32 color coefficients.
         contracted: True for an unbounded scene.
 
     Raises:
-        FieldError: shapes that do not fit, indices out of range or out of order, NaN or infinity.
+        FieldError: mismatching shapes, indices out of range or order, NaN or infinity.
     """
 
     bounds: NDArray[np.float64]
@@ -100,7 +99,7 @@ class VoxelField:
 
     @property
     def sh_degree(self) -> int:
-        """Degree of the colour's spherical harmonics, 0 to 2."""
+        """Degree of the color's spherical harmonics, 0 to 2."""
         return {1: 0, 4: 1, 9: 2}[self.sh.shape[1]]
 
     @property
@@ -118,17 +117,17 @@ class VoxelField:
 
     @property
     def sample_spacing(self) -> float:
-        """World length between two samples that miss no detail: the smallest edge of a voxel."""
+        """World length between samples that resolve all detail: the smallest edge of a voxel."""
         return float(min(self.voxel_size))
 
     @property
     def unbounded(self) -> bool:
-        """True where the field extends beyond `bounds`, which then is the box of interest."""
+        """Whether the field extends beyond `bounds`, its box of interest."""
         return self.contracted
 
     @property
     def center(self) -> NDArray[np.float64]:
-        """Centre [3] of `bounds`."""
+        """Center [3] of `bounds`."""
         return np.asarray(self.bounds.mean(axis=0))
 
     @property
@@ -157,7 +156,7 @@ class VoxelField:
         base = np.clip(np.floor(g).astype(np.int64), 0, n - 2)
         frac = g - base
         basis = spherical_harmonics.sh_basis(np.asarray(viewdirs), self.sh_degree)
-        raw, colour = np.zeros(len(g)), np.full((len(g), 3), 0.5)
+        raw, color = np.zeros(len(g)), np.full((len(g), 3), 0.5)
         for corner in range(8):
             offset = (corner & 1, corner >> 1 & 1, corner >> 2 & 1)
             slot, stored = self.lookup(base + offset)
@@ -166,8 +165,8 @@ class VoxelField:
             x, y, z = (frac[rows, k] if offset[k] else 1.0 - frac[rows, k] for k in range(3))
             weight = x * y * z
             raw[rows] += weight * self.density[slot]
-            colour[rows] += weight[:, None] * np.einsum("nl,nlc->nc", basis[rows], self.sh[slot])
-        rgb = np.clip(colour, 0, 1)
+            color[rows] += weight[:, None] * np.einsum("nl,nlc->nc", basis[rows], self.sh[slot])
+        rgb = np.clip(color, 0, 1)
         sigma = np.where(inside, np.maximum(raw, 0), 0)
         return sigma.astype(np.float32), rgb.astype(np.float32)
 
@@ -182,7 +181,7 @@ class VoxelField:
         return np.where(stored, slot, 0), stored
 
     def save(self, path: str | Path) -> None:
-        """Writes the field to a safetensors file (float32); the folder must exist."""
+        """Write the field to a safetensors file (float32); the folder must exist."""
         tensors = {
             "bounds": self.bounds,
             "resolution": np.array(self.resolution, dtype=np.int64),
@@ -195,10 +194,10 @@ class VoxelField:
 
     @classmethod
     def load(cls, path: str | Path) -> VoxelField:
-        """The field in a safetensors file.
+        """VoxelField of a safetensors file.
 
         Raises:
-            FieldError: the file is missing, truncated, of another kind or newer than this version.
+            FieldError: the file is missing, truncated, of another kind or a newer version.
         """
         cure = "train one with `cagefield train DATA -o SCENE`"
         metadata, tensors = read_tensors(path, "VoxelField", FORMAT_VERSION, cure)
@@ -223,12 +222,13 @@ class VoxelField:
 
 
 def _check_grid(resolution: tuple[int, ...], stored: int) -> None:
-    """Refuses a grid that takes much memory to be drawn, of which a file holds next to nothing."""
+    """Refuse a large grid of which the file stores next to nothing."""
     total = math.prod(resolution)
-    if total > max(_DENSE_GRID, _SPARSEST * stored):
+    if total > max(_MAX_DENSE_VERTICES, _MAX_VERTICES_PER_STORED * stored):
         raise FieldError(
             f"a grid of {' x '.join(map(str, resolution))} would take {4 * total / 1e9:.1f} GB for {stored} "
-            f"stored vertices; a file has one in {_SPARSEST} or more, bake it with a lower resolution"
+            f"stored vertices; a file has one in {_MAX_VERTICES_PER_STORED} or more, "
+            "bake it with a lower resolution"
         )
 
 

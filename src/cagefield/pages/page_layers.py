@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from cagefield.compute.identity_memo import memoized_by_identity
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.fields.voxel_layers import slices_of
+from cagefield.fields.voxel_layers import layer_slices
 from cagefield.pages.page_field import BRICK, encode_vertices, quantised_colours, quantised_density
 from cagefield.typing import Float32
 
@@ -36,7 +36,7 @@ def layer_key(layer: VoxelField) -> str:
 
 def bricks_of(layer: VoxelField, place: int) -> dict[str, int]:
     """Slices of bricks along x: the `place` of a layer, the `first` that it is read in, and their `end`."""
-    low, high = slices_of(layer)
+    low, high = layer_slices(layer)
     return {"place": place // BRICK, "first": low // BRICK, "end": high // BRICK}
 
 

@@ -191,7 +191,7 @@ class Scene:
             sh_degree=sh_degree,
             eyes=np.array([camera.origin for camera in every]) if every else None,
             contracted=unbounded,
-            seen=partial(in_frusta, every, near=near) if unbounded and every else None,
+            visible=partial(in_frusta, every, near=near) if unbounded and every else None,
             on_progress=on_progress,
         )
         kept = original if isinstance(original, NerfField) else None

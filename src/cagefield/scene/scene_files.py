@@ -9,7 +9,7 @@ from typing import Any
 
 from cagefield.cameras.camera import Camera
 from cagefield.errors import CagefieldError, SceneError
-from cagefield.fields.field_files import kind_of
+from cagefield.fields.field_files import read_field_kind
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.files import json_text
@@ -135,7 +135,7 @@ def read_field(path: Path) -> VoxelField | SplatField:
     Raises:
         FieldError: the file is missing, damaged, of a kind that scenes do not hold or of a newer version.
     """
-    kind = kind_of(path)
+    kind = read_field_kind(path)
     if kind == "SplatField":
         return SplatField.load(path)
     return VoxelField.load(path)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import ndimage
 
 from cagefield.completion.surfaces.grid_block import GridBlock, interpolate_field
-from cagefield.fields.sh_rotation import rotated_sh
+from cagefield.fields.sh_rotation import rotate_sh_each
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Mask
 from cagefield.warps.hexahedron_map import HexahedronMap
@@ -54,7 +54,7 @@ def feather_rim(
     # Optical depth is kept: the part's density is multiplied by how much it is stretched.
     density = np.maximum(density, 0.0) * np.cbrt(np.abs(np.linalg.det(jacobian)))
     u, _, v = np.linalg.svd(jacobian)
-    sh = rotated_sh(sh, np.asarray(np.swapaxes(u @ v, 1, 2)))
+    sh = rotate_sh_each(sh, np.asarray(np.swapaxes(u @ v, 1, 2)))
     share = own[rim]
     whole = np.maximum(part.density[rim], 0.0)
     before, new = whole * share, (1.0 - share) * density

@@ -11,7 +11,7 @@ from cagefield.edits.patch import Pasted
 from cagefield.errors import CagefieldError, EditError
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.fields.voxel_layers import slices_of
+from cagefield.fields.voxel_layers import layer_slices
 
 MAX_UNUSED_PASTES = 4
 """Pastes that are kept beside those that were asked for last: undo takes one back."""
@@ -84,7 +84,7 @@ class PasteLoader:
 def _check_size(pastes: Iterable[Pasted], field: VoxelField) -> None:
     """Raises EditError where pastes take too much memory."""
     _, ny, nz = field.resolution
-    ends = [slices_of(each.part) for each in pastes if each.part is not None]
+    ends = [layer_slices(each.part) for each in pastes if each.part is not None]
     vertices = sum(high - low for low, high in ends) * ny * nz
     if vertices > MAX_PASTED_VERTICES:
         raise EditError(

@@ -15,8 +15,8 @@ from scipy import ndimage
 
 from cagefield.edits import EditStack
 from cagefield.fields.contraction import uncontract
-from cagefield.fields.sh import C0, brightened
-from cagefield.fields.sh_rotation import rotated_sh
+from cagefield.fields.sh import C0, scale_sh_colors
+from cagefield.fields.sh_rotation import rotate_sh_each
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Float32, Mask
@@ -182,7 +182,7 @@ class GridBlock:
         """The block with the colours at the vertices of a mask multiplied by ratios [N]."""
         sh = self.sh.copy()
         rows = self.slot[where]
-        sh[rows] = brightened(sh[rows], np.repeat(ratio[:, None], 3, axis=1))
+        sh[rows] = scale_sh_colors(sh[rows], np.repeat(ratio[:, None], 3, axis=1))
         return replace(self, sh=sh)
 
     def colours(self, where: Mask) -> Array:
@@ -324,7 +324,7 @@ def _sample_layers(
         here = np.flatnonzero(layer == number)
         if len(here):
             density[here], colours = interpolate_field(source, points[here])
-            sh[here] = rotated_sh(colours, _color_rotations(jacobian[here]))
+            sh[here] = rotate_sh_each(colours, _color_rotations(jacobian[here]))
     return density, sh
 
 

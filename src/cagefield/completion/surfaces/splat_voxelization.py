@@ -56,14 +56,14 @@ def voxelize_splats(splats: SplatField, box: Array, voxel: float) -> VoxelField:
     vertices = np.flatnonzero(asked)
     density, sh = np.zeros(0, np.float32), np.zeros((0, 1, 3), np.float32)
     if len(near) and len(points):
-        mixture = SplatMixture.of(
+        mixture = SplatMixture.build(
             near.means, near.log_scales, near.quaternions, near.opacities, near.sh[:, :1]
         )
         density = mixture.grid_sigma(points)
         kept = density * voxel > MIN_OPTICAL_DEPTH
         density, vertices, points = density[kept], vertices[kept], points[kept]
         up = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (len(points), 1, 1))
-        sh = ((mixture.along(points, up)[1] - 0.5) / C0).astype(np.float32)
+        sh = ((mixture.evaluate(points, up)[1] - 0.5) / C0).astype(np.float32)
     else:
         vertices = vertices[:0]
     return VoxelField(bounds, (int(count[0]), int(count[1]), int(count[2])), vertices, density, sh)

@@ -1,1 +1,1 @@
-"""Compiled loops of the fields; imported late."""
+"""Numba kernels of the fields; import them only where they run."""

@@ -1,7 +1,8 @@
-"""Sums over the splats at points, for `cagefield.fields.splat_mixture`: Numba, without its threads.
+"""Sums over splats at points, for `cagefield.fields.splat_mixture` (Numba, single-threaded).
 
-Notation as there: u = diag(1/s) R^T (p - m), q = |u|^2, z = o exp(-q/2). A row of `packed` is a splat's
-diag(1/s) R^T (9 values), m (3), -ln o, and q where it ends. A level has cells of one size; the cells of all
+Notation as in `cagefield.fields.splat_mixture`: u = diag(1/s) R^T (p - m), q = |u|^2, z = o exp(-q/2). A row
+of `packed` is a splat's diag(1/s) R^T (9 values), m (3), -ln o, and the q of its end. A level has cells of
+one size; the cells of all
 levels share a hash table with open addressing, `keys` and `starts`: the splats of the cell in a slot are
 ids[starts[slot]:ends[slot]]. Two cells may share a 64-bit key; a pair does with a probability of 2^-64.
 """
@@ -16,17 +17,17 @@ from cagefield.compute.numba_cache import njit
 
 FAST: dict[str, Any] = {"error_model": "numpy", "cache": True, "nogil": True}
 
-PACKED = 14
-"""Values of a packed splat."""
+PACKED_FLOATS = 14
+"""Number of values of a packed splat."""
 
 INVERSE_ROOT_TAU = 0.3989422804014327
 """1 / sqrt(2 pi)"""
 
-SWITCH = 1.6
-"""-ln z up to which the series in -ln z is summed; from there the one in z. Both are good to 1e-6 there."""
+SERIES_LIMIT_W = 1.6
+"""w = -ln z that separates the series in w from the series in z; both are accurate to 1e-6 there."""
 
 EMPTY = -1
-"""The key of a slot that is free."""
+"""Key of a free slot."""
 
 
 @njit(inline="always", **FAST)
@@ -36,7 +37,7 @@ def polylog_half(w):
     For small w it is sqrt(pi / w) + sum_k zeta(1/2 - k) (-w)^k / k!.
     Source: Wood, "The computation of polylogarithms" (1992), equation 9.3.
     """
-    if w < SWITCH:
+    if w < SERIES_LIMIT_W:
         t = -5.4499364e-07 + w * (8.1077370e-08 + w * 1.2169403e-08)
         t = 1.8504213897830974e-04 + w * (2.5763910393465e-05 + w * (-3.710358361e-06 + w * t))
         t = -0.012742600944916527 + w * (-0.0014194881296417216 + w * t)
@@ -49,7 +50,7 @@ def polylog_half(w):
 
 @njit(inline="always", **FAST)
 def cell_key(level, x, y, z):
-    """A 64-bit key of a cell, never EMPTY: its numbers mixed by the finaliser of SplitMix64."""
+    """64-bit key of a cell, never EMPTY: its coordinates mixed by the finalizer of SplitMix64."""
     h = np.uint64(level) * np.uint64(0x9E3779B97F4A7C15)
     for part in (x, y, z):
         h = (h ^ np.uint64(part)) + np.uint64(0x9E3779B97F4A7C15)
@@ -61,9 +62,9 @@ def cell_key(level, x, y, z):
 
 @njit(**FAST)
 def overlapped_cells(packed, half, levels, sizes, keys, ids):
-    """How many cells the splats overlap; `keys` and `ids` are filled with the cells and splats until full.
+    """Number of overlapped cells over all splats; fills `keys` and `ids` with cells and splats until full.
 
-    half [N,3]: half extents of the splats' boxes. A cell counts unless it lies beyond a splat's end along one
+    half [N,3]: half extents of the splats' boxes. A cell counts unless it is beyond a splat's end along one
     of the splat's own axes.
     """
     n = 0
@@ -79,12 +80,12 @@ def overlapped_cells(packed, half, levels, sizes, keys, ids):
                     dx = (x + 0.5) * size - packed[i, 9]
                     dy = (y + 0.5) * size - packed[i, 10]
                     dz = (z + 0.5) * size - packed[i, 11]
-                    apart = False
+                    is_separate = False
                     for a in range(3):
                         p, q, r = packed[i, 3 * a], packed[i, 3 * a + 1], packed[i, 3 * a + 2]
-                        room = 0.5 * size * (abs(p) + abs(q) + abs(r)) * (1.0 + 1e-6)
-                        apart = apart or abs(p * dx + q * dy + r * dz) - room > reach
-                    if apart:
+                        margin = 0.5 * size * (abs(p) + abs(q) + abs(r)) * (1.0 + 1e-6)
+                        is_separate = is_separate or abs(p * dx + q * dy + r * dz) - margin > reach
+                    if is_separate:
                         continue
                     if n < len(ids):
                         keys[n] = cell_key(levels[i], x, y, z)
@@ -95,7 +96,7 @@ def overlapped_cells(packed, half, levels, sizes, keys, ids):
 
 @njit(**FAST)
 def fill_table(cells, table):
-    """Puts keys [M] into the open-addressing table [2^b] (EMPTY before); returns the slot of each."""
+    """Insert keys [M] into the open-addressing table [2^b] (EMPTY before); returns the slots."""
     slots = np.empty(len(cells), np.int64)
     mask = len(table) - 1
     for n in range(len(cells)):
@@ -108,8 +109,8 @@ def fill_table(cells, table):
 
 
 @njit(inline="always", **FAST)
-def slot_of(table, key):
-    """The slot of a key, or -1."""
+def find_slot(table, key):
+    """Slot of a key, or -1."""
     mask = len(table) - 1
     slot = key & mask
     while table[slot] != EMPTY:
@@ -121,7 +122,7 @@ def slot_of(table, key):
 
 @njit(inline="always", **FAST)
 def mahalanobis(packed, i, x, y, z):
-    """q of splat i at a point."""
+    """Squared Mahalanobis distance q of splat i at a point."""
     dx, dy, dz = x - packed[i, 9], y - packed[i, 10], z - packed[i, 11]
     a = packed[i, 0] * dx + packed[i, 1] * dy + packed[i, 2] * dz
     b = packed[i, 3] * dx + packed[i, 4] * dy + packed[i, 5] * dz
@@ -131,7 +132,7 @@ def mahalanobis(packed, i, x, y, z):
 
 @njit(**FAST)
 def densities(packed, layers, sizes, table, starts, ends, ids, points, sigma):
-    """`grid_sigma` [P] at points [P,3].
+    """Write `grid_sigma` [P] at points [P,3].
 
     layers [N,4]: the thinnest axis over its scale, and 1 / (sqrt(2 pi) s_d).
     """
@@ -143,7 +144,7 @@ def densities(packed, layers, sizes, table, starts, ends, ids, points, sigma):
             key = cell_key(
                 level, np.int64(np.floor(x * s)), np.int64(np.floor(y * s)), np.int64(np.floor(z * s))
             )
-            slot = slot_of(table, key)
+            slot = find_slot(table, key)
             if slot < 0:
                 continue
             for e in range(starts[slot], ends[slot]):
@@ -158,8 +159,8 @@ def densities(packed, layers, sizes, table, starts, ends, ids, points, sigma):
 
 
 @njit(**FAST)
-def colours(packed, harmonics, sizes, table, starts, ends, ids, points, along, basis, sigma, rgb):
-    """sigma [P,K] and rgb [P,K,3] at points [P,3] seen along directions [P,K,3], basis [P,K,T]; T >= 1."""
+def colors(packed, harmonics, sizes, table, starts, ends, ids, points, directions, basis, sigma, rgb):
+    """Write sigma [P,K] and rgb [P,K,3] at points [P,3] along directions [P,K,3], basis [P,K,T]; T >= 1."""
     views, terms = basis.shape[1], basis.shape[2]
     for p in range(len(points)):
         x, y, z = np.float64(points[p, 0]), np.float64(points[p, 1]), np.float64(points[p, 2])
@@ -171,7 +172,7 @@ def colours(packed, harmonics, sizes, table, starts, ends, ids, points, along, b
             key = cell_key(
                 level, np.int64(np.floor(x * s)), np.int64(np.floor(y * s)), np.int64(np.floor(z * s))
             )
-            slot = slot_of(table, key)
+            slot = find_slot(table, key)
             if slot < 0:
                 continue
             for e in range(starts[slot], ends[slot]):
@@ -181,7 +182,7 @@ def colours(packed, harmonics, sizes, table, starts, ends, ids, points, along, b
                     continue
                 share = INVERSE_ROOT_TAU * polylog_half(packed[i, 12] + 0.5 * q)
                 for k in range(views):
-                    dx, dy, dz = along[p, k, 0], along[p, k, 1], along[p, k, 2]
+                    dx, dy, dz = directions[p, k, 0], directions[p, k, 1], directions[p, k, 2]
                     a = packed[i, 0] * dx + packed[i, 1] * dy + packed[i, 2] * dz
                     b = packed[i, 3] * dx + packed[i, 4] * dy + packed[i, 5] * dz
                     c = packed[i, 6] * dx + packed[i, 7] * dy + packed[i, 8] * dz

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.fields.sh_rotation import turned_sh
+from cagefield.fields.sh_rotation import rotate_sh
 from cagefield.formats.splats.splat_table import SplatBatch
 from cagefield.geometry.quaternions import quaternions_from_matrices, rotation_matrices
 from cagefield.typing import AnyArray, Array
@@ -66,7 +66,7 @@ def _rotate_harmonics(sh: AnyArray, P: Array) -> AnyArray:
     if not degree:
         return sh
     is_mirrored = np.linalg.det(P) < 0.0
-    turned = turned_sh(sh, -P if is_mirrored else P)
+    turned = rotate_sh(sh, -P if is_mirrored else P)
     if is_mirrored:
         odd = np.concatenate([np.full(2 * l + 1, 1.0 - 2.0 * (l % 2)) for l in range(degree + 1)])  # noqa: E741
         turned = turned * odd[None, :, None].astype(np.float32)

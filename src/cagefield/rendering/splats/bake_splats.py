@@ -15,7 +15,7 @@ import dataclasses
 import numpy as np
 
 from cagefield.edits import EditStack
-from cagefield.fields.sh_rotation import rotated_sh
+from cagefield.fields.sh_rotation import rotate_sh_each
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.quaternions import quaternions_from_matrices, rotation_matrices
 from cagefield.rendering.splats.splat_motion import MovedSplats, moved_splats
@@ -84,7 +84,7 @@ def _baked(field: SplatField, moved: MovedSplats, preserve_opacity: bool) -> tup
         np.log(np.maximum(scales, 1e-30)),
         quaternions_from_matrices(turned),
         opacities,
-        rotated_sh(field.sh[source] if sh is None else sh, _polar_rotations(moved.jacobian)),
+        rotate_sh_each(field.sh[source] if sh is None else sh, _polar_rotations(moved.jacobian)),
     )
     own = (field.means, field.log_scales, field.quaternions, field.opacities, field.sh)
     return tuple(

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.edits import EditStack
-from cagefield.fields.sh import brightened
+from cagefield.fields.sh import scale_sh_colors
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.rendering.splats.splat_motion import MovedSplats, moved_splats
@@ -233,7 +233,7 @@ def changed_splats(
         if gains is not None or others.gains is not None:
             own_gains = np.concatenate([np.ones((len(resting), 3)), _gains_of(others)])[in_order]
             gains = np.concatenate([_gains_of(moved), own_gains])
-    sh = field.sh[sources] if gains is None else brightened(field.sh[sources], gains)
+    sh = field.sh[sources] if gains is None else scale_sh_colors(field.sh[sources], gains)
     new = DeformedSplats(means, covariances, opacities, sh, rotations, field.antialiased)
     told = None if gains is None else gains.astype(np.float32)
     return ChangedSplats(moved.left, sources, new, made_of, jacobian, told)

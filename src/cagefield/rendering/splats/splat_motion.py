@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.patch import SplatPatch
-from cagefield.fields.sh import brightened
+from cagefield.fields.sh import scale_sh_colors
 from cagefield.fields.splat_field import SplatField
 from cagefield.rendering.splats.splat_provenance import at_rest, of_same_scene, pasted_rows
 from cagefield.typing import Array, Mask
@@ -64,7 +64,7 @@ class MovedSplats:
         """The harmonics [M,K,3] of those shown elsewhere, from the field's [N,K,3]; None for its own."""
         if self.gains is None:
             return None
-        return brightened(harmonics[self.source], self.gains)
+        return scale_sh_colors(harmonics[self.source], self.gains)
 
     @classmethod
     def at_rest(cls, field: SplatField) -> MovedSplats:

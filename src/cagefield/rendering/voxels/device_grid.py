@@ -19,7 +19,7 @@ from cagefield.compute import devices
 from cagefield.compute.devices import floats, ints
 from cagefield.compute.quadrants import qd
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.fields.voxel_layers import places_of, slices_of
+from cagefield.fields.voxel_layers import layer_slices, layer_x_offsets
 from cagefield.rendering.voxels.kernels.grid import GridArgs
 from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs
 from cagefield.rendering.voxels.occupancy import BRICK, Occupancy
@@ -88,8 +88,8 @@ class DeviceGrid:
         if not layers:
             return base
         _, ny, nz = self.field.resolution
-        places = places_of(layers)
-        slices = max(slices_of(layer)[1] + place for layer, place in zip(layers, places, strict=True))
+        places = layer_x_offsets(layers)
+        slices = max(layer_slices(layer)[1] + place for layer, place in zip(layers, places, strict=True))
         first = int(np.prod(self.field.resolution))
         index = np.zeros(slices * ny * nz, np.int32)
         index[:first] = base.index.to_numpy()

@@ -13,7 +13,7 @@ from pathlib import Path
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.paste_paths import relative, resolved
 from cagefield.errors import CagefieldError, SceneError
-from cagefield.fields.field_files import kind_of
+from cagefield.fields.field_files import read_field_kind
 from cagefield.files.safe_open import real_path
 from cagefield.scene.scene_files import FIELD, is_scene
 
@@ -100,6 +100,6 @@ def sources_under(root: Path, own: Iterable[Path], *, splats: bool) -> list[str]
 def _holds(scene: Path, splats: bool) -> bool:
     """Whether a scene's field is of splats, or of voxels."""
     try:
-        return (kind_of(scene / FIELD) == "SplatField") == splats
+        return (read_field_kind(scene / FIELD) == "SplatField") == splats
     except CagefieldError:
         return False

@@ -98,4 +98,4 @@ def _vertices_in_two_views(
     axis = np.linspace(-2.0, 2.0, resolution)
     c = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     points = uncontract(c) * ((bounds[1] - bounds[0]) / 2) + bounds.mean(axis=0)
-    return in_frusta([view.camera for view in views], points, near, least=min(2, len(views)))
+    return in_frusta([view.camera for view in views], points, near, min_views=min(2, len(views)))
