@@ -25,9 +25,8 @@ instead, with the same integral,
 
 whose samples at a distance of 2 scales sum up to that integral within 2 %. Second, it does not depend on the
 direction: 1 / s_d is replaced by its root mean square over directions, sqrt((1/s_1^2 + 1/s_2^2 + 1/s_3^2) /
-3). On a layer of flat splats
-this is .58 of the value along the normal. There the opacity of a ray does not depend on its angle, but in a grid it
-grows as 1 / cos: half is right on average over visible directions.
+3). On a layer of flat splats this is .58 of the value along the normal. There the opacity of a ray does not
+depend on its angle, but in a grid it grows as 1 / cos: half is right on average over visible directions.
 
 A splat contributes where o G is at least `MIN_RAY_OPACITY`; its opacity is at most `MAX_OPACITY`, as in
 images.
