@@ -17,7 +17,7 @@ from cagefield.rendering.splats.rasterizer import (
     tiled,
     world_to_camera,
 )
-from cagefield.training.splats.kernels.splat_backward import CURVATURES, GRADIENTS, backpropagate
+from cagefield.training.splats.kernels.splat_backward import CURVATURE_FLOATS, GRADIENT_FLOATS, backpropagate
 from splat_views import NEAR, single, splats_of
 
 Values = dict[str, NDArray]
@@ -31,15 +31,15 @@ def rounded(values: Values) -> Values:
 def analytic(
     values: Values, view: Camera, target: NDArray, background: NDArray, antialiased: bool
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Gradients [N,GRADIENTS], curvatures [N,CURVATURES], and the splats drawn."""
+    """Gradients [N,GRADIENT_FLOATS], curvatures [N,CURVATURE_FLOATS], and the splats drawn."""
     splats = single(splats_of(values, antialiased))
     seen = project(splats, view, near=NEAR)
     tiles, stops = seen.blend(COLOUR)
     colour = np.ascontiguousarray(tiles[:, 1:4] + tiles[:, :1] * background[:, None].astype(np.float32))
     slopes = colour - tiled(target.astype(np.float32))
     lens = intrinsics(view)
-    gradients = np.zeros((len(splats), GRADIENTS), np.float32)
-    curvatures = np.zeros((len(splats), CURVATURES), np.float32)
+    gradients = np.zeros((len(splats), GRADIENT_FLOATS), np.float32)
+    curvatures = np.zeros((len(splats), CURVATURE_FLOATS), np.float32)
     sums = seen.gradients(colour, slopes, stops)
     with kernels():
         backpropagate(

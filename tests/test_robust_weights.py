@@ -6,7 +6,12 @@ import numpy as np
 
 from cagefield.rendering.splats.kernels.projection import TILE
 from cagefield.rendering.splats.rasterizer import tiled, untiled
-from cagefield.training.splats.robust_weights import MIN_SCALE, MIN_WEIGHT, SCALE_MEDIANS, RobustWeights
+from cagefield.training.splats.robust_weights import (
+    MIN_BLOCK_WEIGHT,
+    MIN_RESIDUAL_SCALE,
+    SCALE_MEDIANS,
+    RobustWeights,
+)
 
 DOWN, ACROSS = 4, 6
 SIZE = ACROSS * TILE, DOWN * TILE
@@ -31,7 +36,7 @@ def test_an_outlier_counts_for_little_and_the_rest_for_all():
     difference = np.zeros((SIZE[1], SIZE[0], 3))
     difference[20:44, 30:60] = 0.4
     found = weights_of(difference)
-    assert found[20:44, 30:60].max() == np.float32(MIN_WEIGHT)
+    assert found[20:44, 30:60].max() == np.float32(MIN_BLOCK_WEIGHT)
     far = np.ones(found.shape, bool)
     far[8:56, 16:72] = False
     assert found[far].min() > 0.99
@@ -42,7 +47,7 @@ def test_fine_texture_that_the_field_lacks_keeps_its_weight():
     difference = 0.15 * rng.choice([-1.0, 1.0], (SIZE[1], SIZE[0], 1)).repeat(3, axis=2)
     # A block's mean of 64 signs is .15 / 8 wide, in 3 channels .03: half the scale, a weight of .6.
     assert np.median(weights_of(difference)) > 0.4
-    assert np.median(weights_of(np.full_like(difference, 0.15))) == np.float32(MIN_WEIGHT)
+    assert np.median(weights_of(np.full_like(difference, 0.15))) == np.float32(MIN_BLOCK_WEIGHT)
 
 
 def test_masked_pixels_say_nothing():
@@ -56,7 +61,7 @@ def test_masked_pixels_say_nothing():
 def test_the_scale_follows_the_usual_residual():
     robust = RobustWeights([(DOWN, ACROSS)])
     robust.update_scale()
-    assert robust.scale == MIN_SCALE
+    assert robust.scale == MIN_RESIDUAL_SCALE
     robust.add(0, np.full((DOWN * ACROSS, 3, TILE * TILE), 0.05, np.float32), ONES, None)
     robust.update_scale()
     assert np.isclose(robust.scale, SCALE_MEDIANS * 0.05 * 3**0.5, rtol=1e-5)

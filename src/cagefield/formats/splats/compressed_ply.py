@@ -42,7 +42,7 @@ from cagefield.formats.splats.splat_table import (
 )
 from cagefield.typing import AnyArray
 
-CHUNK_SPLATS = 256
+SPLATS_PER_CHUNK = 256
 """Number of splats per chunk."""
 
 _PACKED_COLUMNS = ("packed_position", "packed_rotation", "packed_scale", "packed_color")
@@ -64,10 +64,10 @@ def open_compressed_ply(path: Path) -> SplatSource:
     missing += [name for name in _LIMIT_COLUMNS[:12] if name not in chunk.columns]
     if missing:
         raise FieldError(f"{path}: a compressed file that lacks {', '.join(missing)}; export it again")
-    if chunk.count != -(-vertex.count // CHUNK_SPLATS):
+    if chunk.count != -(-vertex.count // SPLATS_PER_CHUNK):
         raise FieldError(
             f"{path}: {chunk.count} chunks for {vertex.count} splats, expected "
-            f"{-(-vertex.count // CHUNK_SPLATS)}; export it again"
+            f"{-(-vertex.count // SPLATS_PER_CHUNK)}; export it again"
         )
     if harmonics.columns and harmonics.count != vertex.count:
         raise FieldError(f"{path}: its harmonics are not those of {vertex.count} splats; export it again")
@@ -77,7 +77,7 @@ def open_compressed_ply(path: Path) -> SplatSource:
     def batches() -> Iterator[SplatBatch]:
         for first in range(0, vertex.count, BATCH_SPLATS):
             last = first + BATCH_SPLATS
-            chunks = chunk.rows(first // CHUNK_SPLATS, -(-last // CHUNK_SPLATS))
+            chunks = chunk.rows(first // SPLATS_PER_CHUNK, -(-last // SPLATS_PER_CHUNK))
             yield _unpack_batch(vertex.rows(first, last), chunks, harmonics.rows(first, last), degree)
 
     end = max(table.end for table in (vertex, chunk, harmonics))
@@ -92,7 +92,7 @@ def write_compressed_ply(path: Path, table: SplatTable, on_progress: OnProgress 
     header = ["ply", "format binary_little_endian 1.0", "comment written by cagefield"]
     header += render_mode_comment(table)
     header += [
-        f"element chunk {-(-table.count // CHUNK_SPLATS)}",
+        f"element chunk {-(-table.count // SPLATS_PER_CHUNK)}",
         *(f"property float {name}" for name in _LIMIT_COLUMNS),
     ]
     header += [f"element vertex {table.count}", *(f"property uint {name}" for name in _PACKED_COLUMNS)]
@@ -127,7 +127,7 @@ def _whole_chunks(batches: Iterable[SplatBatch]) -> Iterator[SplatBatch]:
     rest_rows: list[AnyArray] = []
     for batch in batches:
         rows = np.concatenate([*rest_rows, batch.to_rows()])
-        whole = len(rows) // CHUNK_SPLATS * CHUNK_SPLATS
+        whole = len(rows) // SPLATS_PER_CHUNK * SPLATS_PER_CHUNK
         if whole:
             yield SplatBatch.from_rows(rows[:whole])
         rest_rows = [rows[whole:]]
@@ -137,8 +137,8 @@ def _whole_chunks(batches: Iterable[SplatBatch]) -> Iterator[SplatBatch]:
 
 def _pack_batch(batch: SplatBatch) -> tuple[AnyArray, NDArray[np.uint32]]:
     """(limits [chunks,18], packed values [n,4]) of whole chunks."""
-    starts = np.arange(0, len(batch), CHUNK_SPLATS)
-    row = np.arange(len(batch)) // CHUNK_SPLATS
+    starts = np.arange(0, len(batch), SPLATS_PER_CHUNK)
+    row = np.arange(len(batch)) // SPLATS_PER_CHUNK
     colors = batch.sh[:, 0].astype(np.float64) * spherical_harmonics.C0 + 0.5
     columns, shares = [], []
     for values in (
@@ -180,7 +180,7 @@ def _encode_smallest_three(quaternions: AnyArray) -> NDArray[np.uint32]:
 
 def _unpack_batch(vertex: Columns, chunk: Columns, harmonics: Columns, degree: int) -> SplatBatch:
     position, rotation, scale, color = (vertex[name].astype(np.uint32) for name in _PACKED_COLUMNS)
-    row = np.arange(len(position)) // CHUNK_SPLATS
+    row = np.arange(len(position)) // SPLATS_PER_CHUNK
     rgba = _unpack_bits(color, (24, 8), (16, 8), (8, 8), (0, 8))
     rgb = (
         _dequantize(chunk, "", "rgb", row, rgba[:, :3])

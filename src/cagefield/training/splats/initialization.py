@@ -65,7 +65,7 @@ class InitialSplats(NamedTuple):
 def initialize_splats(
     dataset: Dataset, views: Sequence[TrainingView], config: SplatConfig, max_splats: int
 ) -> InitialSplats:
-    """Initial splats of a training on photos, at max_splats `max_splats`, with the photos' free space.
+    """Initial splats of a training on photos, at most `max_splats`, with the photos' free space.
 
     Splats lie at the data set's points (random ones without), at points from plane sweeping, and, for an
     unbounded capture, on a far sphere.
@@ -255,7 +255,7 @@ def infer_free_distances(distances: NDArray[np.float32]) -> NDArray[np.float32]:
     """(free distance, confidence) [2,H,W] from known free distances [H,W], 0 where unknown.
 
     Textureless regions mostly lie between textured ones: an unknown pixel takes INFERRED_DISTANCE_SHARE of
-    the least known distance in the smallest window that has one, of at max_splats INFERENCE_SIDE_SHARE of the
+    the least known distance in the smallest window that has one, of at most INFERENCE_SIDE_SHARE of the
     photo.
     """
     from scipy.ndimage import minimum_filter

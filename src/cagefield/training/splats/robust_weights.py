@@ -5,7 +5,8 @@ single field explains. Fine texture that the field does not resolve yet has a si
 out over a block. Each photo has, for each block of BLOCK_PIXELS x BLOCK_PIXELS pixels, a running mean of the
 residual r_B = |mean_B(image - photo)| over color channels, and the weight
 
-    w_B = max(MIN_WEIGHT, 1 / (1 + (r_B / s)^2)^2),   s = max(MIN_SCALE, SCALE_MEDIANS median(r)),
+    w_B = max(MIN_BLOCK_WEIGHT, 1 / (1 + (r_B / s)^2)^2)
+    s = max(MIN_RESIDUAL_SCALE, SCALE_MEDIANS median(r))
 
 of Geman and McClure, with the median over blocks of all photos. Where a block's residual exceeds half the
 scale, r_B is the largest residual among the block's neighbors, so that the outlines of an outlier lose weight
@@ -30,13 +31,13 @@ BLOCK_PIXELS = 8
 RESIDUAL_DECAY = 0.5
 """Decay of a block's residual per visit of its photo."""
 
-MIN_SCALE = 0.06
+MIN_RESIDUAL_SCALE = 0.06
 """Minimum residual at which a weight falls to a quarter, for colors in [0,1]."""
 
 SCALE_MEDIANS = 8.0
 """Residual at which a weight falls to a quarter, in medians of all blocks' residuals."""
 
-MIN_WEIGHT = 0.15
+MIN_BLOCK_WEIGHT = 0.15
 """Minimum weight of a block; a region that no other photo shows still trains, only slower."""
 
 ROBUST_START_PROGRESS = 0.25
@@ -60,7 +61,7 @@ class RobustWeights:
         self._ends = np.cumsum([0, *(down * across * _SIDE**2 for down, across in tiles)])
         self.residuals: NDArray[np.float32] = np.zeros(int(self._ends[-1]), np.float32)
         self.visits: NDArray[np.int64] = np.zeros(len(tiles), np.int64)
-        self.scale = MIN_SCALE
+        self.scale = MIN_RESIDUAL_SCALE
 
     def photo_residuals(self, index: int) -> NDArray[np.float32]:
         """Residuals [h,w] of a photo's blocks."""
@@ -92,7 +93,7 @@ class RobustWeights:
         """Set the scale from the residuals of all visited photos."""
         seen = [self.photo_residuals(int(n)).ravel()[::7] for n in np.flatnonzero(self.visits)]
         if seen:
-            self.scale = max(MIN_SCALE, SCALE_MEDIANS * float(np.median(np.concatenate(seen))))
+            self.scale = max(MIN_RESIDUAL_SCALE, SCALE_MEDIANS * float(np.median(np.concatenate(seen))))
 
     def block_weights(self, index: int) -> NDArray[np.float32]:
         """Weights [h,w] of a photo's blocks."""
@@ -101,7 +102,7 @@ class RobustWeights:
         own = self.photo_residuals(index)
         around = np.where(own > 0.5 * self.scale, maximum_filter(own, 3, mode="nearest"), own)
         weights = 1.0 / (1.0 + (around / self.scale) ** 2) ** 2
-        return np.maximum(weights, MIN_WEIGHT).astype(np.float32)
+        return np.maximum(weights, MIN_BLOCK_WEIGHT).astype(np.float32)
 
     def scale_weights(self, index: int, weights: NDArray[np.float32]) -> None:
         """Multiply the pixel weights [tiles,AREA] of a photo at full size by its block weights."""

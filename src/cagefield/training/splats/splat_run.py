@@ -48,7 +48,7 @@ from cagefield.training.splats.initialization import (
 )
 from cagefield.training.splats.kernels.gauss_newton_splats import gauss_newton, residuals
 from cagefield.training.splats.kernels.splat_backward import backpropagate, build_covariances
-from cagefield.training.splats.kernels.ssim import MOMENTS, WINDOW_PIXELS, add_ssim_gradient
+from cagefield.training.splats.kernels.ssim import MOMENT_PLANES, WINDOW_PIXELS, add_ssim_gradient
 from cagefield.training.splats.pose_optimization import POSE_START_PROGRESS, PoseRefinement
 from cagefield.training.splats.robust_weights import ROBUST_START_PROGRESS, RobustWeights
 from cagefield.training.splats.splat_config import CHECKPOINT_KEYS, SplatConfig
@@ -228,7 +228,7 @@ class SplatRun:
         add_ssim_gradient(
             color, target, projected.width, projected.height, gain, background, weights,
             self._config.ssim_lambda,
-            self._buffers.take("moments", (3, MOMENTS, *size), np.float32),
+            self._buffers.take("moments", (3, MOMENT_PLANES, *size), np.float32),
             self._buffers.take("moment_slopes", (3, 3, *size), np.float32),
             self._buffers.take("pixels", (3, 2, *size), np.float32), slopes,
         )  # fmt: skip

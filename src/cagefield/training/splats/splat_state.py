@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.fields.splat_field import SplatField
-from cagefield.training.splats.kernels.gauss_newton_splats import MOMENTS, RUNNING
-from cagefield.training.splats.kernels.splat_backward import CURVATURES, GRADIENTS
+from cagefield.training.splats.kernels.gauss_newton_splats import MOMENTUM_FLOATS, RUNNING_FLOATS
+from cagefield.training.splats.kernels.splat_backward import CURVATURE_FLOATS, GRADIENT_FLOATS
 from cagefield.typing import Float32
 
 
@@ -88,11 +88,11 @@ class SplatState:
 def _empty_optimizer_rows(n: int) -> tuple[Any, ...]:
     """Zeroed optimizer arrays of n splats, in the order of SplatState's fields."""
     return (
-        np.zeros((n, MOMENTS), np.float32),
-        np.zeros((n, RUNNING), np.float32),
+        np.zeros((n, MOMENTUM_FLOATS), np.float32),
+        np.zeros((n, RUNNING_FLOATS), np.float32),
         np.zeros(n, np.int32),
         np.zeros(n, np.float32),
         np.zeros(n, np.int32),
-        np.zeros((n, GRADIENTS), np.float32),
-        np.zeros((n, CURVATURES), np.float32),
+        np.zeros((n, GRADIENT_FLOATS), np.float32),
+        np.zeros((n, CURVATURE_FLOATS), np.float32),
     )

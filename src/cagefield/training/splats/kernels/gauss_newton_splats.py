@@ -21,7 +21,7 @@ from numba import prange
 from cagefield.compute.numba_cache import FAST, njit
 from cagefield.rendering.splats.kernels.projection import AREA, MAX_TERMS, TILE, harmonics_at
 
-MOMENTS, RUNNING = 13, 17
+MOMENTUM_FLOATS, RUNNING_FLOATS = 13, 17
 """Floats of a splat's running gradient, and of its running curvature (the last is the sum of weights)."""
 
 CURRENT_CURVATURE_SHARE = 0.5

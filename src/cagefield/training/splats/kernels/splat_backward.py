@@ -32,10 +32,10 @@ from cagefield.rendering.splats.kernels.projection import (
     harmonics_at,
 )
 
-GRADIENTS = 16
+GRADIENT_FLOATS = 16
 """0-2 mean, 3-5 log scales, 6-8 turn, 9 logit, 10-12 color, 13 |dL/d(projected mean)|, 14 sum of weights,
 15 sum of weight |dL/dC|^2."""
-CURVATURES = 16
+CURVATURE_FLOATS = 16
 """0-5 mean (xx xy xz yy yz zz), 6-11 log scales (same order), 12-14 turn, 15 logit."""
 
 LENS_STEP = 1e-4
@@ -85,7 +85,7 @@ def backpropagate(
     gradients,
     curvatures,
 ):
-    """Write gradients [N,GRADIENTS] and curvatures [N,CURVATURES] of the splats in `order`; others stay.
+    """Write gradients [N,GRADIENT_FLOATS] and curvatures [N,CURVATURE_FLOATS] of the splats in `order`.
 
     The color's gradient is before its clamp at 0. `directional` adds the mean's gradient through the viewing
     direction of the color, where the clamp is inactive.

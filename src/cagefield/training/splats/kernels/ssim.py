@@ -18,7 +18,7 @@ from cagefield.rendering.splats.kernels.projection import TILE
 WINDOW_PIXELS = 11
 """Side of a window; its Gaussian has a standard deviation of 1.5."""
 
-MOMENTS = 5
+MOMENT_PLANES = 5
 """Planes per channel between the passes: means of image, photo, their squares, their product."""
 
 _HALF = WINDOW_PIXELS // 2
@@ -36,7 +36,7 @@ def add_ssim_gradient(
 
     color and slopes [tiles,3,AREA]; target [tiles, 3 or 4, AREA] uint8 with straight alpha over the
     background; gain and background [3]. Where `weights` [tiles,AREA] are 0 the photo counts as equal to the
-    image. moments [3,MOMENTS,H,W], moment_slopes [3,3,H,W] and pixels [3,2,H,W] are scratch.
+    image. moments [3,MOMENT_PLANES,H,W], moment_slopes [3,3,H,W] and pixels [3,2,H,W] are scratch.
     """
     across = (width + TILE - 1) // TILE
     alpha = target.shape[1] == 4
@@ -73,10 +73,10 @@ def add_ssim_gradient(
         result[:] = np.float32(0)
         if y < _HALF or y >= height - _HALF:
             continue
-        sums = np.zeros((MOMENTS, width), np.float32)
+        sums = np.zeros((MOMENT_PLANES, width), np.float32)
         for k in range(WINDOW_PIXELS):
             w = _WEIGHTS[k]
-            for j in range(MOMENTS):
+            for j in range(MOMENT_PLANES):
                 source = moments[ch, j, y + k - _HALF]
                 for i in range(width):
                     sums[j, i] += w * source[i]

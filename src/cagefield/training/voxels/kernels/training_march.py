@@ -46,7 +46,7 @@ SAMPLE_FLOATS = 8
 MAX_SAMPLES = 512
 """Maximum number of noted samples per ray."""
 
-MIN_WEIGHT = 1e-4
+MIN_SAMPLE_WEIGHT = 1e-4
 """Minimum weight of a sample with a color."""
 
 
@@ -219,7 +219,7 @@ def march_batch(
                                 keep = qd.exp(-raw * h)
                                 w = T * (1.0 - keep)
                                 T *= keep
-                                if w > MIN_WEIGHT:
+                                if w > MIN_SAMPLE_WEIGHT:
                                     color = gather_rgb(grid.sh, slots, b, basis, K)
                                     C += w * qd.max(qd.min(color, 1.0), 0.0)
                                     if samples < MAX_SAMPLES:
