@@ -6,7 +6,7 @@ table of contents, and one Zstandard frame per stream. Streams:
 
     positions   3 x 24-bit fixed point (version 1: 3 x float16)
     opacities   uint8, in [0, 1]
-    colors     3 x uint8: f_dc = (u / 255 - .5) / .15
+    colors      3 x uint8: f_dc = (u / 255 - .5) / .15
     scales      3 x uint8: log scale = u / 16 - 10
     rotations   versions 1, 2: x y z as uint8, u / 127.5 - 1, w >= 0; 3, 4: the smallest three, 9 bits and a
                 sign each, and the index of the largest (x y z w)

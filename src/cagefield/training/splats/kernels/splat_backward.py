@@ -4,8 +4,10 @@ Notation as in `rendering.splats.kernels.projection` and `blending`. A splat's p
 scales, a rotation `turn` about its own axes (R <- R exp([turn]x)), the logit of its opacity, and its color
 before the clamp at 0. k_j = M R_j is the screen vector of its unit axis j. With G = dL/dS, S the projected
 covariance:
-    log scale j:  dS = 2 s_j^2 k_j k_j^T                  turn about j: dS = (s_m^2 - s_n^2) (k_m k_n^T +
-    k_n k_m^T)
+
+    log scale j:   dS = 2 s_j^2 k_j k_j^T
+    turn about j:  dS = (s_m^2 - s_n^2) (k_m k_n^T + k_n k_m^T)
+
 and (m, n) the other two axes. G = sum v e e^T / 2; an antialiased splat's opacity adds v K / 2,
 K = (M C M^T)^-1 - S^-1, to it. Curvatures are Gauss-Newton's, sum over pixels and channels of
 (dC/dparameter)^2.
