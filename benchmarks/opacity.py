@@ -147,14 +147,14 @@ def _scaled(
 ) -> tuple[str, ...]:
     cameras = bench.scene(name).cameras["test"][:views]
     model = procedural_scene(name)
-    moved = model.move(parts, scale=factors, pivot=pivot).carrying_light()
+    moved = model.move(parts, scale=factors, pivot=pivot).with_modeled_light()
     # The edit scales about the cage's centre; what remains takes that to where scaling about the pivot does.
     shift = (1.0 - np.array(factors)) * (pivot - cage.center)
     edit = Edit(cage, adjustment="discrete").scale(factors).translate(shift)
     truth = np.stack([moved.photograph(camera, background="white").rgb8() for camera in cameras])
     what = "all" if len(parts) > 1 else parts[0]
     same = "x".join(f"{f:g}" for f in factors)
-    before = bench.modelled(name, cameras)
+    before = bench.modeled(name, cameras)
     return _row(bench, name, what, same, EditStack([edit]), cameras, before, truth)
 
 

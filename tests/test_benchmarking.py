@@ -177,7 +177,7 @@ def test_an_edit_of_nothing_loses_nothing(bench: Workbench) -> None:
     scene = bench.scene("microphone")
     cameras = scene.cameras["test"]
     still = Edit(Cage.box((0, 0, 0), 1.0), Cage.box((0, 0, 0), 2.0))
-    truth = bench.modelled("microphone", cameras)
+    truth = bench.modeled("microphone", cameras)
     shown, edited = (seen(scene.with_edits(EditStack(e)), cameras) for e in ([], [still]))
     figures = compare(shown, edited, truth, truth)
     assert figures.lost == 0.0 and figures.changed == 0.0
@@ -190,7 +190,7 @@ def test_an_edit_of_nothing_loses_nothing(bench: Workbench) -> None:
 def test_the_truth_of_a_delete_has_the_part_gone(bench: Workbench) -> None:
     one = case("microphone", "delete_base")
     cameras = bench.photos("microphone").test
-    before = bench.modelled("microphone", [view.camera for view in cameras])
+    before = bench.modeled("microphone", [view.camera for view in cameras])
     after = bench.moved(one, [view.camera for view in cameras])
     for view, was, now in zip(cameras, before, after, strict=True):
         # Behind most of the base's rim, far from the pole, there is nothing.
@@ -204,7 +204,7 @@ def test_the_truth_of_a_delete_has_the_part_gone(bench: Workbench) -> None:
 
 def test_photos_of_the_data_set_are_the_unedited_truth(bench: Workbench) -> None:
     views = bench.photos("microphone").test
-    truth = bench.modelled("microphone", [view.camera for view in views])
+    truth = bench.modeled("microphone", [view.camera for view in views])
     for view, picture in zip(views, truth, strict=True):
         photo = view.load().astype(float)
         white = photo[..., :3] * photo[..., 3:] / 255 + 255 - photo[..., 3:]
@@ -218,7 +218,7 @@ def test_the_exact_map_of_a_whole_scene_is_its_motion(bench: Workbench) -> None:
     (edit,) = one.edits
     moved = model.move(
         model.part_names, scale=(1, 1.35, 0.75), translate=(0, 0, -0.2475), pivot=edit.inner.center
-    ).carrying_light()
+    ).with_modeled_light()
     camera = bench.photos("chair").test[0].camera.resized(64, 64)
     (mapped,) = bench.mapped("chair", one.edits, [camera])
     truth = moved.photograph(camera, background="white").rgb8()
@@ -232,7 +232,7 @@ def test_old_shadows_stay_where_the_true_ones_go(bench: Workbench) -> None:
     one = case("microphone", "delete_base")
     cameras = [view.camera.resized(64, 64) for view in bench.photos("microphone").test]
     true, old = bench.moved(one, cameras), bench.moved(one, cameras, old_shadows=True)
-    before = bench.modelled("microphone", cameras)
+    before = bench.modeled("microphone", cameras)
     differ = changed_pixels(true, old)
     assert 0 < differ.mean() < 0.05
     assert (true.astype(int) - old)[differ].sum() > 0
@@ -241,7 +241,7 @@ def test_old_shadows_stay_where_the_true_ones_go(bench: Workbench) -> None:
 
 def test_exact_maps_of_no_edit_and_of_parts_that_do_not_move(bench: Workbench) -> None:
     camera = bench.photos("chair").test[0].camera.resized(24, 24)
-    np.testing.assert_array_equal(bench.mapped("chair", None, [camera]), bench.modelled("chair", [camera]))
+    np.testing.assert_array_equal(bench.mapped("chair", None, [camera]), bench.modeled("chair", [camera]))
     with pytest.raises(CagefieldError, match="no part of chair is moved by lower_wider"):
         bench.moved(case("chair", "lower_wider"), [])
 

@@ -40,7 +40,7 @@ def test_a_nerf_is_measured_by_its_exact_pictures(tmp_path: Path) -> None:
     cameras = scene.cameras["test"][:1]
     exact = np.clip(render_nerf(scene.original, cameras[0], background="white").rgb, 0, 1)
     np.testing.assert_allclose(seen(scene, cameras)[0], exact, atol=1e-6)
-    truth = bench.modelled("microphone", cameras)[0] / 255.0
+    truth = bench.modeled("microphone", cameras)[0] / 255.0
     assert score.views == 1 and score.figures.unedited == pytest.approx(psnr(exact, truth), abs=1e-3)
     text = table([score], settings).markdown()
     assert "8 steps: the original NeRF, networks of 3 x 24, 12 + 12 samples a ray" in text

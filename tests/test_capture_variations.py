@@ -16,24 +16,24 @@ from cagefield.procedural import ProceduralScene, capture, make_capture
 from cagefield.procedural.distractors import (
     PERSON_CLEARANCE,
     PERSON_HEIGHT,
-    person,
-    person_in_view,
-    sheet_behind,
-    with_distractors,
+    add_distractors,
+    build_person,
+    place_person_in_view,
+    place_sheet_behind,
 )
-from cagefield.procedural.flash import NEAREST, STRENGTH, FlashLight
-from cagefield.procedural.hand_held import picture
-from cagefield.procedural.parts import Part, Primitive, place
+from cagefield.procedural.flash import FLASH_STRENGTH, MIN_FLASH_DISTANCE, FlashLight
+from cagefield.procedural.hand_held import render_image
+from cagefield.procedural.parts import Part, Primitive, pose_matrix
 from cagefield.procedural.rooms import ROOMS
 from cagefield.procedural.shapes import Box, Sphere
-from cagefield.procedural.srgb import encoded, linear
+from cagefield.procedural.srgb import decode_srgb, encode_srgb
 from cagefield.procedural.textures import Plain
 from cagefield.procedural.variations import (
     BACKDROP_SHARE,
     MAX_GAIN,
     PERSON_SHARE,
     Changes,
-    changes_of,
+    draw_changes,
 )
 from commands import printed, refused
 
@@ -59,7 +59,7 @@ def photo(folder: Path, index: int) -> np.ndarray:
 def changes(name: str) -> tuple[Changes, ...]:
     plan = capture(name)
     cameras = plan.cameras(plan.phone.resized(SIZE), VIEWS, 0)
-    return changes_of(plan.variations, plan.scene, cameras, plan.target, TRAINING, 0)
+    return draw_changes(plan.variations, plan.scene, cameras, plan.target, TRAINING, 0)
 
 
 def test_held_out_photos_are_those_of_the_room_alone(captures):
@@ -97,8 +97,8 @@ def test_the_image_of_a_distractor_holds_the_pixels_that_it_changes(name):
     plan = capture(f"{name}+person+backdrop")
     cameras = plan.cameras(plan.phone.resized(SIZE), VIEWS, 0)
     index, change = next((i, c) for i, c in enumerate(changes(plan.name)) if len(c.parts) == 2)
-    rgb, distance = picture(plan.scene, cameras[index])
-    image, nearest, shown = with_distractors(plan.scene, change.parts, cameras[index], rgb, distance)
+    rgb, distance = render_image(plan.scene, cameras[index])
+    image, nearest, shown = add_distractors(plan.scene, change.parts, cameras[index], rgb, distance)
     np.testing.assert_array_equal(image[~shown], rgb[~shown])
     np.testing.assert_array_equal(nearest[~shown], distance[~shown])
     assert (nearest <= distance).all() and 0.02 < shown.mean() < 0.9
@@ -106,7 +106,7 @@ def test_the_image_of_a_distractor_holds_the_pixels_that_it_changes(name):
 
 
 def glowing(name: str, shape: Box | Sphere, color: tuple[float, float, float], at: tuple[float, ...]) -> Part:
-    return Part(name, (Primitive(shape, Plain(color, 0.0), place(at)[None], luminous=1.0),))
+    return Part(name, (Primitive(shape, Plain(color, 0.0), pose_matrix(at)[None], luminous=1.0),))
 
 
 def test_added_parts_hide_and_are_hidden_as_in_a_scene_that_has_them():
@@ -116,8 +116,8 @@ def test_added_parts_hide_and_are_hidden_as_in_a_scene_that_has_them():
     near = glowing("near", Sphere(0.15), (0.1, 0.8, 0.1), (-0.2, -1.0, -0.1))
     camera = Camera.look_at((0.3, -4.0, 0.5), (0, 0, 0), width=70, height=60, fov_x=0.6)
     alone, together = ProceduralScene("one", (wall,)), ProceduralScene("all", (wall, ball, near))
-    expected, true_distance = picture(together, camera)
-    image, distance, shown = with_distractors(alone, (ball, near), camera, *picture(alone, camera))
+    expected, true_distance = render_image(together, camera)
+    image, distance, shown = add_distractors(alone, (ball, near), camera, *render_image(alone, camera))
     np.testing.assert_allclose(image, expected, atol=1e-6)
     np.testing.assert_array_equal(distance, true_distance)
     # pixels that show them are neither pure wall nor pure background
@@ -135,13 +135,13 @@ def test_exposures_are_gains_of_linear_light_clipped(captures):
         if change.parts:
             continue
         before, after = photo(plain, index), photo(exposed, index)
-        expected = encoded(np.clip(change.gains * linear(before), 0, 1))
+        expected = encode_srgb(np.clip(change.gains * decode_srgb(before), 0, 1))
         # noise of some .006 and JPEG in both photos; where the plain photo is white, nothing is known
         known = before.max(-1) < 0.98
         assert np.abs(after - expected)[known].mean() < 0.012
         assert np.abs((after - expected)[known].mean()) < 0.004
     white = [
-        photo(exposed, index)[change.gains * linear(photo(plain, index)) > 1.1]
+        photo(exposed, index)[change.gains * decode_srgb(photo(plain, index)) > 1.1]
         for index, change in enumerate(chosen)
         if not change.parts
     ]
@@ -167,12 +167,12 @@ def test_a_flash_adds_the_light_of_a_lamp_at_the_camera():
     tilted = (np.sqrt(0.75), 0, 0.5)
     normals = np.array([(0, 0, 1), (0, 0, 1), tilted], np.float32).T
     rgb = flash(albedo, points, normals, -normals, occlusion=np.ones(3, np.float32), gloss=(0.0, 8.0))
-    power = STRENGTH * np.array([1 / 2.5**2, 1 / NEAREST**2, 0.5 / 2.0**2])
-    expected = encoded(linear(np.array(0.24)) + linear(np.array(0.8)) * power)
+    power = FLASH_STRENGTH * np.array([1 / 2.5**2, 1 / MIN_FLASH_DISTANCE**2, 0.5 / 2.0**2])
+    expected = encode_srgb(decode_srgb(np.array(0.24)) + decode_srgb(np.array(0.8)) * power)
     np.testing.assert_allclose(rgb, np.repeat(expected[:, None], 3, 1), rtol=1e-5)
     shiny = flash(albedo, points, normals, -normals, occlusion=np.ones(3, np.float32), gloss=(0.5, 2.0))
-    glint = linear(np.array(0.24)) + (linear(np.array(0.8)) + 0.5 * np.array([1, 1, 0.25])) * power
-    np.testing.assert_allclose(shiny[:, 0], encoded(glint), rtol=1e-5)
+    glint = decode_srgb(np.array(0.24)) + (decode_srgb(np.array(0.8)) + 0.5 * np.array([1, 1, 0.25])) * power
+    np.testing.assert_allclose(shiny[:, 0], encode_srgb(glint), rtol=1e-5)
 
 
 def test_a_flash_brightens_half_of_the_training_photos_and_most_what_is_near(captures):
@@ -182,11 +182,11 @@ def test_a_flash_brightens_half_of_the_training_photos_and_most_what_is_near(cap
     plan = capture("room-chair")
     cameras = plan.cameras(plan.phone.resized(SIZE), VIEWS, 0)
     for index, fired in enumerate(chosen):
-        gain = linear(photo(flashed, index)).mean() / linear(photo(plain, index)).mean()
+        gain = decode_srgb(photo(flashed, index)).mean() / decode_srgb(photo(plain, index)).mean()
         assert gain > 1.02 if fired else gain == 1.0
     index = chosen.index(True)
-    distance = picture(plan.scene, cameras[index])[1]
-    added = (linear(photo(flashed, index)) - linear(photo(plain, index))).mean(-1)
+    distance = render_image(plan.scene, cameras[index])[1]
+    added = (decode_srgb(photo(flashed, index)) - decode_srgb(photo(plain, index))).mean(-1)
     near = distance < np.quantile(distance, 0.2)
     assert added[near].mean() > 1.5 * added[distance > np.quantile(distance, 0.8)].mean()
 
@@ -209,14 +209,14 @@ def test_persons_stand_in_the_room_in_view_and_sheets_are_behind_the_object(name
     low, high = np.array(plan.scene.room.low), np.array(plan.scene.room.high)
     rng = np.random.RandomState(3)
     for camera in cameras[::4]:
-        sheet = sheet_behind(plan.scene, camera, plan.target, rng)
-        away = np.linalg.norm(sheet.bounds.mean(0) - camera.origin)
+        build_sheet = place_sheet_behind(plan.scene, camera, plan.target, rng)
+        away = np.linalg.norm(build_sheet.bounds.mean(0) - camera.origin)
         if plan.target is not None:
             assert away > np.linalg.norm(np.array(plan.target) - camera.origin) + 0.5
-        pixel, ahead = camera.project(sheet.bounds.mean(0)[None])
+        pixel, ahead = camera.project(build_sheet.bounds.mean(0)[None])
         shift = np.abs(pixel[0] - (camera.cx, camera.cy))
         assert ahead[0] > 0 and (shift < (camera.width, camera.height)).all()
-        figure = person_in_view(plan.scene, camera, rng)
+        figure = place_person_in_view(plan.scene, camera, rng)
         if figure is None:
             continue
         middle = figure.bounds.mean(0)
@@ -233,14 +233,14 @@ def test_persons_stand_in_the_room_in_view_and_sheets_are_behind_the_object(name
 
 
 def test_a_person_is_a_metre_seventy_tall_and_turns():
-    figure = person(np.zeros(3), 0.0)
+    figure = build_person(np.zeros(3), 0.0)
     column = np.array([[0.0, -0.04, z] for z in (PERSON_HEIGHT - 0.02, PERSON_HEIGHT + 0.02)], np.float32)
     sole = np.array([[0.4, 0.16, z] for z in (0.02, -0.05)], np.float32)
     for points in (column, sole):
         inside, outside = ProceduralScene("person", (figure,)).field(eps=0.02).distance(points)[0]
         assert inside < 0 < outside
     low, high = figure.bounds
-    turned = person(np.array([1.0, 2.0, 0.0]), 90.0).bounds
+    turned = build_person(np.array([1.0, 2.0, 0.0]), 90.0).bounds
     np.testing.assert_allclose((turned[1] - turned[0])[[1, 0, 2]], high - low, atol=0.1)
 
 

@@ -24,7 +24,7 @@ from cagefield.errors import CagefieldError
 from cagefield.images.image_files import read_image
 from cagefield.images.render_result import RenderResult
 from cagefield.procedural import capture, make_capture
-from cagefield.procedural.hand_held import picture
+from cagefield.procedural.hand_held import render_image
 from cagefield.training.evaluation import Evaluation, ViewMetrics
 from commands import printed, refused
 
@@ -38,7 +38,7 @@ def room(tmp_path_factory):
 def taken(case: Case | None, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """The digger's room, edited by hand, from a camera: (rgb, distance)."""
     scene = capture("room-digger").scene
-    return picture(scene if case is None or case.moved is None else case.moved(scene), camera)
+    return render_image(scene if case is None or case.moved is None else case.moved(scene), camera)
 
 
 def exact(further: float = 1.0, veil: float = 0.0, gain: float = 1.0) -> Learnt:

@@ -36,7 +36,9 @@ def photos(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Points that are found stay out of the user's cache."""
-    monkeypatch.setattr("cagefield.training.splats.train_splats.points_cache", lambda: tmp_path / "points")
+    monkeypatch.setattr(
+        "cagefield.training.splats.train_splats.points_cache_folder", lambda: tmp_path / "points"
+    )
     return tmp_path / "points"
 
 

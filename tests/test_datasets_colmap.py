@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.datasets import load_dataset
 from cagefield.datasets.colmap import colmap_files
-from cagefield.datasets.colmap.colmap_files import check_whole
-from cagefield.datasets.nerf_normalization import in_unit_cube
+from cagefield.datasets.colmap.colmap_files import check_complete
+from cagefield.datasets.nerf_normalization import normalize_to_unit_cube
 from cagefield.errors import DatasetError
 from posed_photos import HEIGHT, POINT, WIDTH, assert_spot_is_where_the_camera_says, project, ring, save, spot
 
@@ -157,7 +157,7 @@ def test_points_are_in_the_levelled_world_with_colours_errors_and_the_views_that
 def test_points_follow_the_data_set_into_another_world(tmp_path):
     _write(tmp_path, n=5)
     data = load_dataset(tmp_path)
-    moved = in_unit_cube(data)
+    moved = normalize_to_unit_cube(data)
     for before, after in zip(data.train, moved.train, strict=True):
         old, _ = before.camera.project(data.points.positions)
         new, _ = after.camera.project(moved.points.positions)
@@ -221,17 +221,17 @@ def rigs(tmp_path_factory):
 @pytest.mark.parametrize("part", [1 << 20, 64, 5])
 def test_binary_files_cut_off_anywhere_are_noticed(rigs, tmp_path, monkeypatch, name, part):
     """However much of them is held at a time, at least one byte; what is asked for is read anew."""
-    monkeypatch.setattr(colmap_files, "_PART", part)
-    check_whole(rigs)
+    monkeypatch.setattr(colmap_files, "_WINDOW_BYTES", part)
+    check_complete(rigs)
     whole = (rigs / name).read_bytes()
     for length in {*range(0, len(whole), 7), len(whole) - 1}:
         (tmp_path / name).write_bytes(whole[:length])
         with pytest.raises(
             DatasetError, match=rf"{name}: the file is cut off after {length} bytes; copy or export"
         ):
-            check_whole(tmp_path)
+            check_complete(tmp_path)
     (tmp_path / name).write_bytes(whole)
-    check_whole(tmp_path)
+    check_complete(tmp_path)
 
 
 def test_a_model_cut_off_is_refused(tmp_path):

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.datasets import load_dataset
 from cagefield.datasets.sfm.pose_refinement import RefinedPoses
-from cagefield.datasets.sfm.pose_verification import with_cameras
+from cagefield.datasets.sfm.pose_verification import replace_cameras
 from cagefield.files.ply import read_ply
 from cagefield.scene.scene import Scene
 from commands import printed
@@ -119,6 +119,6 @@ def test_poses_in_another_world_have_no_offset(tmp_path, aligned):
     with pytest.warns(UserWarning, match="far from the origin"):
         data = load_dataset(tmp_path)
     cameras = {view.name: view.camera for view in (*data.train, *data.test)}
-    found = with_cameras(data, RefinedPoses(cameras, data.points, 0.5, aligned))
+    found = replace_cameras(data, RefinedPoses(cameras, data.points, 0.5, aligned))
     assert found.offset == (data.offset if aligned else (0.0, 0.0, 0.0))
     np.testing.assert_array_equal(found.source_to_world, data.source_to_world if aligned else np.eye(4))

@@ -197,7 +197,7 @@ def test_a_mask_is_undistorted_with_its_photo(tmp_path):
     view = View("a", lens.camera, tmp_path / "a.png", mask=PhotoMask(tmp_path / "m.png"), source=lens.source)
     valid, white = view.valid_pixels(), view.load()[..., 0]
     # The nearest pixel decides: at a corner a quarter of the linear mean may be on its side.
-    assert (white[~valid & lens.source.resampled_mask(None, lens.camera)] >= 63).all()
+    assert (white[~valid & lens.source.resample_mask(None, lens.camera)] >= 63).all()
     assert (white[valid] <= 192).all() and (white > 200).sum() > 300
 
 

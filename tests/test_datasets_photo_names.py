@@ -68,7 +68,7 @@ def test_the_longest_end_decides(tmp_path):
         "back/images/1.jpg",
     ]
     assert set(found.moved) == set(names)
-    assert found.name_of(names[0], tmp_path) == "front/images/1.jpg"
+    assert found.relative_view_name(names[0], tmp_path) == "front/images/1.jpg"
     with pytest.warns(
         UserWarning, match="here: 2 of 2 photos are not where it says, found below .*D:/x/front"
     ):

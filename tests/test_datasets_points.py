@@ -14,7 +14,12 @@ import pytest
 from cagefield.cameras.camera import Camera
 from cagefield.datasets import load_dataset
 from cagefield.datasets.nerf_normalization import Similarity
-from cagefield.datasets.sfm.sparse_points import points_of, random_points, read_cached_points, training_points
+from cagefield.datasets.sfm.sparse_points import (
+    random_points,
+    read_cached_points,
+    starting_points,
+    training_points,
+)
 from cagefield.datasets.sfm.triangulation import nearest_pairs, triangulate
 from cagefield.datasets.views import SparsePoints
 from cagefield.errors import DatasetError
@@ -35,7 +40,7 @@ def data(capture):
 
 @pytest.fixture(scope="module")
 def points(data, tmp_path_factory):
-    return points_of(data, tmp_path_factory.mktemp("cache"))
+    return starting_points(data, tmp_path_factory.mktemp("cache"))
 
 
 def test_points_lie_on_the_surfaces_that_the_photos_show(data, points):
@@ -60,14 +65,14 @@ def test_training_views_alone_make_the_points_of_a_training(data, points, tmp_pa
     tested = {view.name for view in data.test}
     trained = {view.name for view in data.train}
     assert len(tested) == 2 and all(seen <= trained for seen in points.seen_by)
-    everything = points_of(data, tmp_path, views="all")
+    everything = starting_points(data, tmp_path, views="all")
     assert any(seen & tested for seen in everything.seen_by)
 
 
 @pytest.mark.parametrize(("lens", "cut_out"), [("opencv_fisheye", False), ("opencv", True)])
 def test_fisheyes_and_cut_outs(tmp_path, lens, cut_out):
     data = load_dataset(textured_capture(tmp_path, 8, 1.2, cut_out, lens), holdout=0)
-    found = points_of(data)
+    found = starting_points(data)
     assert len(found) > 100
     distances = distance_to_textures(found.positions)
     if cut_out:  # the outline is no place: all points are on the ball
@@ -80,14 +85,14 @@ def test_another_world_gives_the_same_points_there(data, points):
     rigid[:3, :3] = Camera.look_at((1, 2, 3), (0, 0, 0), width=2, height=2, fov_x=1.0).c2w[:3, :3]
     rigid[:3, 3] = 5000.0, -300.0, 20.0
     similarity = Similarity(rigid, 100.0)
-    moved = points_of(similarity.dataset(data, np.array([[-1e4] * 3, [1e4] * 3])))
+    moved = starting_points(similarity.transform_dataset(data, np.array([[-1e4] * 3, [1e4] * 3])))
     assert abs(len(moved) - len(points)) <= 0.01 * len(points)
     back = (moved.positions - rigid[:3, 3]) @ rigid[:3, :3] / 100.0
     assert np.median(distance_to_textures(back)) < 0.01
 
 
 def test_points_made_again_are_the_same(data, points):
-    np.testing.assert_allclose(points_of(data).positions, points.positions, atol=1e-6)
+    np.testing.assert_allclose(starting_points(data).positions, points.positions, atol=1e-6)
 
 
 def test_shrunk_photos_give_the_same_points(capture, points):
@@ -108,7 +113,7 @@ def test_poses_off_by_a_little_still_give_points(data):
 
 
 def test_the_cache_serves_the_same_capture_and_no_other(capture, data, tmp_path, monkeypatch):
-    first = points_of(data, tmp_path)
+    first = starting_points(data, tmp_path)
     (file,) = tmp_path.iterdir()
     asked = []
 
@@ -117,23 +122,23 @@ def test_the_cache_serves_the_same_capture_and_no_other(capture, data, tmp_path,
         return first.take(np.arange(60))
 
     monkeypatch.setattr("cagefield.datasets.sfm.sparse_points.triangulate", made_again)
-    again = points_of(data, tmp_path)
+    again = starting_points(data, tmp_path)
     assert not asked
     np.testing.assert_array_equal(again.positions, first.positions)
     np.testing.assert_array_equal(again.rgb, first.rgb)
     np.testing.assert_array_equal(again.errors, first.errors)
     assert again.seen_by == first.seen_by
     moved = dataclasses.replace(data.train[0], camera=data.train[1].camera)
-    assert len(points_of(dataclasses.replace(data, train=(moved, *data.train[1:])), tmp_path)) == 60
-    assert len(points_of(data, tmp_path, seed=1)) == 60
+    assert len(starting_points(dataclasses.replace(data, train=(moved, *data.train[1:])), tmp_path)) == 60
+    assert len(starting_points(data, tmp_path, seed=1)) == 60
     file.write_bytes(file.read_bytes()[:2000])  # a damaged file is made again
-    assert len(points_of(data, tmp_path)) == 60
+    assert len(starting_points(data, tmp_path)) == 60
     photo = data.train[0].image_path
     before = photo.read_bytes()
     save(photo, photo_of_textures(data.train[1].camera))
     try:
         asked.clear()
-        points_of(data, tmp_path)
+        starting_points(data, tmp_path)
         assert asked == [len(data.train)]
     finally:
         photo.write_bytes(before)
@@ -214,8 +219,8 @@ def test_a_data_set_s_own_points_are_used_without_those_of_held_out_photos(data)
     own = SparsePoints(positions, np.zeros((120, 3), np.uint8), tuple(seen))
     with_points = dataclasses.replace(data, points=own)
     assert len(training_points(with_points)) == 60
-    np.testing.assert_array_equal(points_of(with_points).positions, positions[:60])
-    assert points_of(with_points, views="all") is own
+    np.testing.assert_array_equal(starting_points(with_points).positions, positions[:60])
+    assert starting_points(with_points, views="all") is own
     unknown = SparsePoints(positions, np.zeros((120, 3), np.uint8))
     assert training_points(dataclasses.replace(data, points=unknown)) is unknown
     assert training_points(data) is None
@@ -226,14 +231,14 @@ def test_photos_without_texture_give_none_with_one_warning(tmp_path):
     for photo in tmp_path.glob("*/*.png"):
         save(photo, np.full((240, 320, 3), 90, np.uint8))
     with pytest.warns(UserWarning, match=r"the photos give 0 points, too few to start from") as caught:
-        assert points_of(load_dataset(tmp_path, holdout=0), tmp_path / "cache") is None
+        assert starting_points(load_dataset(tmp_path, holdout=0), tmp_path / "cache") is None
     assert len(caught) == 1
 
 
 def test_without_pycolmap_the_warning_names_the_cure(data, monkeypatch):
     monkeypatch.setitem(sys.modules, "pycolmap", None)
     with pytest.warns(UserWarning, match=r"pip install -U pycolmap") as caught:
-        assert points_of(data) is None
+        assert starting_points(data) is None
     assert len(caught) == 1
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cagefield.cameras.camera import Camera
-from cagefield.datasets.scene_bounds import cube_of_interest, focus_point, levelling_rotation
+from cagefield.datasets.scene_bounds import cube_of_interest, focus_point, leveling_rotation
 from posed_photos import ring
 
 
@@ -116,7 +116,7 @@ def test_levelling_finds_up_from_level_cameras(sweep):
     tilt = Rotation.from_euler("XYZ", (0.7, -0.4, 1.1)).as_matrix()
     poses = np.array(ring(16, sweep=sweep))
     poses[:, :3] = tilt @ poses[:, :3]
-    rotation = levelling_rotation(poses)
+    rotation = leveling_rotation(poses)
     # cameras without roll determine it exactly, even over a quarter of a circle from above
     np.testing.assert_allclose(rotation @ tilt @ (0, 0, 1), (0, 0, 1), atol=1e-9)
     np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
@@ -128,14 +128,14 @@ def test_levelling_of_hand_held_forward_facing_cameras_takes_the_mean_up():
     poses = np.array(_facing(40, 0.3))
     poses[:, :3, :3] = poses[:, :3, :3] @ Rotation.from_rotvec(rng.normal(0, 0.05, (40, 3))).as_matrix()
     # right axes leave what is across them open (53 degrees off here); 40 ups average to 0.05 / sqrt(40)
-    np.testing.assert_allclose(levelling_rotation(poses) @ (0, 0, 1), (0, 0, 1), atol=0.03)
+    np.testing.assert_allclose(leveling_rotation(poses) @ (0, 0, 1), (0, 0, 1), atol=0.03)
 
 
 def test_levelling_of_a_forward_facing_capture():
     tilt = Rotation.from_euler("XYZ", (0.7, -0.4, 1.1)).as_matrix()
     poses = np.array(_facing(9, 0.3, toe_in=0.05))
     poses[:, :3] = tilt @ poses[:, :3]
-    levelled = levelling_rotation(poses) @ poses[:, :3, :3]
+    levelled = leveling_rotation(poses) @ poses[:, :3, :3]
     np.testing.assert_allclose(levelled[:, :, 1].mean(axis=0), (0, 0, 1), atol=1e-6)
     ahead = -levelled[:, :, 2].mean(axis=0)
     np.testing.assert_allclose(ahead / np.linalg.norm(ahead), (0, 1, 0), atol=1e-6)

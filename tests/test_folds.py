@@ -69,12 +69,12 @@ def folded() -> list[Camera]:
 
 
 def test_right_poses_are_not_folded(photos, tmp_path):
-    assert ambiguity_check.find_fold(dataset(tmp_path / "room", cameras(), photos)) is None
+    assert ambiguity_check.check_ambiguity(dataset(tmp_path / "room", cameras(), photos)) is None
 
 
 def test_two_sides_that_lie_on_each_other_are_found(photos, tmp_path):
     steps = []
-    fold = ambiguity_check.find_fold(
+    fold = ambiguity_check.check_ambiguity(
         dataset(tmp_path / "room", folded(), photos), lambda done, note: steps.append((done, note))
     )
     assert fold is not None and fold.compared == COUNT and fold.photos >= COUNT // 2
@@ -89,20 +89,20 @@ def test_one_wrong_pose_blur_and_darkness_are_no_fold(photos, tmp_path):
     shown = list(photos)
     shown[9] = np.full_like(shown[9], 128)
     shown[13] = (shown[13] * 0.4).astype(np.uint8)
-    assert ambiguity_check.find_fold(dataset(tmp_path / "room", poses, shown)) is None
+    assert ambiguity_check.check_ambiguity(dataset(tmp_path / "room", poses, shown)) is None
 
 
 def test_few_photos_and_walls_without_texture_are_no_fold(photos, tmp_path):
-    assert ambiguity_check.find_fold(dataset(tmp_path / "two", folded()[:2], photos[:2])) is None
+    assert ambiguity_check.check_ambiguity(dataset(tmp_path / "two", folded()[:2], photos[:2])) is None
     plain = [np.full_like(pixels, 200) for pixels in photos]
-    assert ambiguity_check.find_fold(dataset(tmp_path / "plain", folded(), plain)) is None
+    assert ambiguity_check.check_ambiguity(dataset(tmp_path / "plain", folded(), plain)) is None
 
 
 def test_photos_that_agree_with_nobody_do_not_count():
     pairs = [(0, 1), (1, 2), (2, 3), (4, 5)]
     alike = np.array([0.9, 0.1, 0.9, 0.1])
-    assert ambiguity_check.contradicting(pairs, alike, 6) == {1, 2}
-    assert ambiguity_check.contradicting(pairs, np.full(4, np.nan), 6) == set()
+    assert ambiguity_check.find_contradicting_photos(pairs, alike, 6) == {1, 2}
+    assert ambiguity_check.find_contradicting_photos(pairs, np.full(4, np.nan), 6) == set()
 
 
 class _Solver:
@@ -132,7 +132,9 @@ def test_training_finds_folded_poses_anew_and_holds_out_the_same_photos(
     )
     solver = _Solver(right)
     monkeypatch.setattr("cagefield.datasets.sfm.pose_verification.PoseSolver", solver)
-    monkeypatch.setattr("cagefield.datasets.sfm.pose_verification.poses_cache", lambda: tmp_path / "cache")
+    monkeypatch.setattr(
+        "cagefield.datasets.sfm.pose_verification.poses_cache_folder", lambda: tmp_path / "cache"
+    )
     found = poses_command.verified(wrong).dataset
     said = capsys.readouterr().out
     assert len(solver.calls) == 1 and "poses are folded" in said and "--keep-poses" in said
@@ -148,7 +150,9 @@ def test_training_finds_folded_poses_anew_and_holds_out_the_same_photos(
 def test_a_fold_that_structure_from_motion_finds_too_is_kept_and_said(photos, tmp_path, monkeypatch, capsys):
     wrong = dataset(tmp_path / "wrong", folded(), photos)
     monkeypatch.setattr("cagefield.datasets.sfm.pose_verification.PoseSolver", _Solver(wrong))
-    monkeypatch.setattr("cagefield.datasets.sfm.pose_verification.poses_cache", lambda: tmp_path / "cache")
+    monkeypatch.setattr(
+        "cagefield.datasets.sfm.pose_verification.poses_cache_folder", lambda: tmp_path / "cache"
+    )
     assert poses_command.verified(wrong).dataset is wrong
     said = capsys.readouterr().out
     assert "poses look folded" in said and "structure from motion finds the same poses" in said

@@ -108,7 +108,7 @@ def test_half_a_file_with_a_digests_name_goes_with_the_next_that_is_written(
     """Its own name may not come again: the digest is of a run that was killed."""
     half = [left(tmp_path / "chair" / f"{kind}-00.npz", "part", ended) for kind in ("truth", "other")]
     camera = Camera.look_at((3.0, 0.0, 0.0), (0.0, 0.0, 0.0), width=16, height=16, fov_x=0.5)
-    Workbench(Settings(), tmp_path).modelled("chair", [camera])
+    Workbench(Settings(), tmp_path).modeled("chair", [camera])
     assert not any(file.exists() for file in half)
     assert [file.suffix for file in (tmp_path / "chair").iterdir()] == [".npz"]
 

@@ -19,8 +19,8 @@ from cagefield.errors import SceneError
 from cagefield.geometry.cage import Cage
 from cagefield.images.metrics import psnr
 from cagefield.procedural import SCENES, ProceduralScene, procedural_scene
-from cagefield.procedural.distance_cells import SPACING, DistanceCells
-from cagefield.procedural.parts import Part, Primitive, place
+from cagefield.procedural.distance_cells import CELL_SIZE, DistanceCells
+from cagefield.procedural.parts import Part, Primitive, pose_matrix
 from cagefield.procedural.shapes import Box, Cylinder, Sphere
 from cagefield.procedural.textures import Plain
 from cagefield.rendering.reference_renderer import PointMap, intersect_box
@@ -87,7 +87,7 @@ def test_cells_bound_the_distance_and_give_it_near_surfaces(name: str) -> None:
     alike = ~np.array([item.stretched for item in scene.placed])[owner]
     # float32 of coordinates near 1, and distances of stretched parts are of first order
     assert (found.bound <= np.where(alike, true, np.inf) + 2e-6).all()
-    near = alike & (true < 0.9 * SPACING) & ~np.isin(found.primitive, _stretched(scene))
+    near = alike & (true < 0.9 * CELL_SIZE) & ~np.isin(found.primitive, _stretched(scene))
     assert near.sum() > 50
     np.testing.assert_allclose(found.bound[near], true[near], atol=2e-6)
     np.testing.assert_array_equal(found.primitive[near], owner[near])
@@ -128,7 +128,7 @@ def test_an_affine_edit_of_a_whole_scene_is_its_motion() -> None:
     (edit,) = case.edits
     moved = scene.move(
         scene.part_names, scale=(1, 1.35, 0.75), translate=(0, 0, -0.2475), pivot=edit.inner.center
-    ).carrying_light()
+    ).with_modeled_light()
     frame = MappedScene(scene, exact(case.edits)).photograph(camera, background="white")
     truth = moved.photograph(camera, background="white")
     # 2 of 3 pixels of 64 have an edge; the unmoved chair is 11 dB
@@ -143,7 +143,7 @@ def test_a_turned_part_is_seen_by_its_canonical_directions() -> None:
     moved = scene.move("thing", rotate=(0.2, 0.3, 0.9), pivot=(0, 0, 0))
     frame = MappedScene(scene, exact(EditStack([edit]))).photograph(view(48, 0.4), background="white")
     carried, lit = (
-        each.photograph(view(48, 0.4), background="white") for each in (moved.carrying_light(), moved)
+        each.photograph(view(48, 0.4), background="white") for each in (moved.with_modeled_light(), moved)
     )
     # subsamples at edges may fall to the one side or the other; within faces the pictures are equal
     assert psnr(frame.rgb, carried.rgb) > 38
@@ -153,8 +153,8 @@ def test_a_turned_part_is_seen_by_its_canonical_directions() -> None:
 
 
 def test_a_thin_rod_in_a_twisted_shell_is_not_missed() -> None:
-    rod = Primitive(Cylinder(0.004, 0.9), GREY, place((0.28, 0, 0))[None])
-    scene = scene_of(rod, Primitive(Sphere(0.1), GREY, place((0, 0, 0.5))[None]))
+    rod = Primitive(Cylinder(0.004, 0.9), GREY, pose_matrix((0.28, 0, 0))[None])
+    scene = scene_of(rod, Primitive(Sphere(0.1), GREY, pose_matrix((0, 0, 0.5))[None]))
     inner = Cage.box((0, 0, 0), (0.8, 0.8, 0.5))
     edit = Edit(inner, Cage.box((0, 0, 0), (1.5, 1.5, 1.5))).rotate((0, 0, np.radians(80)))
     mapping = exact(EditStack([edit]))
@@ -190,7 +190,7 @@ def test_cuts_and_copies_have_the_surfaces_that_samples_have() -> None:
 
 def test_a_thin_copy_in_open_space_is_not_stepped_over() -> None:
     """Before the copy a ray's sample is far from all surfaces, and knows nothing of the jump ahead."""
-    scene = scene_of(Primitive(Box((0.004, 0.25, 0.25)), GREY, place((-0.5, 0, 0))[None]))
+    scene = scene_of(Primitive(Box((0.004, 0.25, 0.25)), GREY, pose_matrix((-0.5, 0, 0))[None]))
     copy = Edit(Cage.box((-0.5, 0, 0), (0.012, 0.6, 0.6)), adjustment="discrete", keep_source=True)
     mapping = exact(EditStack([copy.translate((1.0, 0.2, 0))]))
     camera = view(24, 0.6)

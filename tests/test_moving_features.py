@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from cagefield.cameras.camera import Camera
 from cagefield.datasets.sfm import features, structure_from_motion
 from cagefield.datasets.sfm.moving_features import (
-    MIN_MATCHES,
-    MIN_PHOTOS,
+    MIN_MOVING_PHOTOS,
+    MIN_STATIC_MATCHES,
     MatchedFeatures,
     capped_error,
     moving_features,
@@ -57,7 +57,7 @@ def test_a_backdrop_that_moved_is_told_from_the_object_before_it():
     cameras = _cameras()
     moving, photos = moving_features(_scene(True, cameras, _near()), cameras)
     assert set(photos) >= {MOVED_FROM - 2, MOVED_FROM - 1, MOVED_FROM, MOVED_FROM + 1}
-    assert len(photos) >= MIN_PHOTOS and 0 not in photos and PHOTOS - 1 not in photos
+    assert len(photos) >= MIN_MOVING_PHOTOS and 0 not in photos and PHOTOS - 1 not in photos
     for n in (MOVED_FROM - 1, MOVED_FROM):
         assert moving[n][OBJECT:].mean() > 0.9, "the backdrop"
         assert moving[n][:OBJECT].mean() < 0.15, "the object"
@@ -113,7 +113,7 @@ def database(tmp_path):
     path = tmp_path / "database.db"
     camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=400, height=300, params=[400, 200, 150])
     features.create_database(path, [camera], [features.Photo(f"{n}.png", 0) for n in range(3)])
-    rows = np.repeat(np.arange(MIN_MATCHES + 2, dtype=np.uint32)[:, None], 2, axis=1)
+    rows = np.repeat(np.arange(MIN_STATIC_MATCHES + 2, dtype=np.uint32)[:, None], 2, axis=1)
     with features.opened(path) as source:
         for n in range(3):
             keypoints = np.random.default_rng(n).uniform(0, 300, (len(rows), 2)).astype(np.float32)
@@ -127,11 +127,11 @@ def database(tmp_path):
 
 
 def test_matches_of_moving_features_leave_the_database(database):
-    moving: list[NDArray[np.bool_]] = [np.arange(MIN_MATCHES + 2) < 2 for _ in range(3)]
+    moving: list[NDArray[np.bool_]] = [np.arange(MIN_STATIC_MATCHES + 2) < 2 for _ in range(3)]
     assert len(read_features(database, 3).matches) == 3
     assert remove_features(database, moving) == [(0, 1)], "(1, 2) has lost none, (0, 2) has too few left"
     left = read_features(database, 3).matches
-    assert list(left) == [(1, 2)] and len(left[1, 2]) == MIN_MATCHES
+    assert list(left) == [(1, 2)] and len(left[1, 2]) == MIN_STATIC_MATCHES
     with features.opened(database) as source:
         assert np.asarray(source.read_matches(1, 2)).min() == 2 and not source.exists_matches(1, 3)
 
@@ -167,7 +167,7 @@ def test_poses_without_moving_things_are_taken_where_no_photo_is_lost_and_the_re
     scene = _scene(True, right, _near())
     (tmp_path / "database.db").write_bytes(b"")
     patches = {
-        "unfolded_models": lambda work, *_: ([models["plain"]], work / "database.db"),
+        "build_unambiguous_models": lambda work, *_: ([models["plain"]], work / "database.db"),
         "_cameras": lambda model: cameras[id(model)],
         "match": lambda *_, **options: None,
         "_map": lambda *_, **options: [models["static"]],

@@ -13,7 +13,7 @@ from PIL import Image
 
 from cagefield.datasets import load_dataset
 from cagefield.datasets.photos import find_photo, read_header, read_photo, report_conversions
-from cagefield.datasets.raw_photos import find_raw_photos, upright
+from cagefield.datasets.raw_photos import find_raw_photos, write_upright
 from cagefield.errors import DatasetError
 from cagefield.images.image_files import read_image
 from heic_photos import BLUE, HEIC, RED, TURNED_HEIC, WHITE
@@ -67,7 +67,7 @@ def test_the_rotation_of_a_heic_file_belongs_to_its_pixels(tmp_path):
     np.testing.assert_allclose(pixels[4, 44], WHITE, atol=4)  # upper right
     np.testing.assert_allclose(pixels[4, 4], RED, atol=4)
     np.testing.assert_allclose(pixels[60, 24], BLUE, atol=4)
-    photo = upright(tmp_path / "a.HEIC", "a.HEIC", tmp_path / "out")  # not turned twice
+    photo = write_upright(tmp_path / "a.HEIC", "a.HEIC", tmp_path / "out")  # not turned twice
     assert (photo.width, photo.height, photo.name) == (48, 64, "a.HEIC.jpg")
     with Image.open(photo.path) as image:
         assert image.format == "JPEG"
@@ -88,14 +88,14 @@ def test_avif_photos_are_turned_as_their_file_says(tmp_path, orientation):
     assert (header.height, header.width) == expected.shape[:2]
     found = read_photo(tmp_path / "a.avif")
     np.testing.assert_allclose(found[4::8, 4::8], expected[4::8, 4::8], atol=40)
-    photo = upright(tmp_path / "a.avif", "a.avif", tmp_path / "out")
+    photo = write_upright(tmp_path / "a.avif", "a.avif", tmp_path / "out")
     np.testing.assert_allclose(read_photo(photo.path)[4::8, 4::8], expected[4::8, 4::8], atol=40)
 
 
 def test_the_content_decides_about_the_format(tmp_path):
     (tmp_path / "a.jpg").write_bytes(HEIC)
     assert read_photo(tmp_path / "a.jpg").shape == (48, 64, 3)
-    photo = upright(tmp_path / "a.jpg", "a.jpg", tmp_path / "out")
+    photo = write_upright(tmp_path / "a.jpg", "a.jpg", tmp_path / "out")
     with Image.open(photo.path) as image:
         assert image.format == "JPEG"
 
@@ -130,7 +130,12 @@ def test_without_pi_heif_the_cure_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pi_heif", None)
     (tmp_path / "a.heic").write_bytes(HEIC)
     message = r"a\.heic: HEIC photos are read by pi-heif; pip install pi-heif, or convert it to JPEG$"
-    for read in (read_header, read_photo, read_image, lambda path: upright(path, "a", tmp_path / "out")):
+    for read in (
+        read_header,
+        read_photo,
+        read_image,
+        lambda path: write_upright(path, "a", tmp_path / "out"),
+    ):
         with pytest.raises(DatasetError, match=message):
             read(tmp_path / "a.heic")
 
@@ -253,7 +258,7 @@ def test_display_p3_becomes_srgb(tmp_path, name):
     np.testing.assert_allclose(read_image(tmp_path / name)[8, 8], p3_to_srgb(color), atol=2)
     conversion = read_header(tmp_path / name).conversion
     assert conversion == "with the color profile Display P3, converted to sRGB"
-    photo = upright(tmp_path / name, name, tmp_path / "out")
+    photo = write_upright(tmp_path / name, name, tmp_path / "out")
     with Image.open(photo.path) as image:
         assert "icc_profile" not in image.info
         np.testing.assert_allclose(np.asarray(image)[8, 8], p3_to_srgb(color), atol=3)

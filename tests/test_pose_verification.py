@@ -22,7 +22,7 @@ from cagefield.datasets.sfm.epipolar_error import (
 )
 from cagefield.datasets.sfm.pose_alignment import align_poses
 from cagefield.datasets.sfm.pose_refinement import camera_groups
-from cagefield.datasets.sfm.pose_verification import all_views, describe, verify_poses
+from cagefield.datasets.sfm.pose_verification import describe, sorted_views, verify_poses
 from cagefield.datasets.sfm.transforms_writer import write_transforms
 from cagefield.datasets.views import Dataset
 from posed_photos import ring, textured_capture
@@ -38,10 +38,10 @@ def capture(tmp_path_factory) -> Dataset:
 
 def disagreement(one: Dataset, other: Dataset) -> tuple[float, float]:
     """(largest turn in degrees, largest offset) between aligned cameras: errors of the shape alone."""
-    poses = np.stack([view.camera.c2w for view in all_views(one)])
-    target = np.stack([view.camera.c2w for view in all_views(other)])
+    poses = np.stack([view.camera.c2w for view in sorted_views(one)])
+    target = np.stack([view.camera.c2w for view in sorted_views(other)])
     found = align_poses(poses, target)
-    moved = np.stack([found.moved_pose(pose) for pose in poses])
+    moved = np.stack([found.transform_pose(pose) for pose in poses])
     turns = Rotation.from_matrix(moved[:, :3, :3].transpose(0, 2, 1) @ target[:, :3, :3]).magnitude()
     return np.degrees(turns.max()), float(np.linalg.norm(moved[:, :3, 3] - target[:, :3, 3], axis=1).max())
 
@@ -106,10 +106,10 @@ def test_perturbed_poses_are_adjusted_in_their_world_and_kept_for_next_time(capt
     turn, offset = disagreement(found.dataset, capture)
     assert turn < 0.3 and offset < 0.02
     # The given world, up to the mean of the noise: 1 degree over the root of the number of photos, twice.
-    given = np.stack([view.camera.c2w[:3, :3] for view in all_views(capture)])
-    now = np.stack([view.camera.c2w[:3, :3] for view in all_views(found.dataset)])
+    given = np.stack([view.camera.c2w[:3, :3] for view in sorted_views(capture)])
+    now = np.stack([view.camera.c2w[:3, :3] for view in sorted_views(found.dataset)])
     assert np.degrees(Rotation.from_matrix(now.transpose(0, 2, 1) @ given).magnitude()).max() < 2 / COUNT**0.5
-    focals = {round(view.camera.fx, 6) for view in all_views(found.dataset)}
+    focals = {round(view.camera.fx, 6) for view in sorted_views(found.dataset)}
     assert len(focals) == 1 and focals.pop() == pytest.approx(capture.train[0].camera.fx, rel=0.02)
     assert len(found.dataset.points) > 100 and [v.name for v in found.dataset.test] == [
         v.name for v in capture.test
@@ -193,7 +193,7 @@ def test_a_camera_for_each_photo_of_one_lens_becomes_one_camera(capture):
     found = verify_poses(given)
     assert found.before.has_scattered_focals and found.outcome in ("adjusted", "rebuilt")
     assert found.after.median < 0.5
-    focals = {round(view.camera.fx, 6) for view in all_views(found.dataset)}
+    focals = {round(view.camera.fx, 6) for view in sorted_views(found.dataset)}
     assert len(focals) == 1 and focals.pop() == pytest.approx(capture.train[0].camera.fx, rel=0.03)
     turn, offset = disagreement(found.dataset, capture)
     assert turn < 0.6 and offset < 0.04
@@ -217,7 +217,7 @@ def test_masked_features_do_not_count(capture, tmp_path):
     mask = np.zeros((360, 480), np.uint8)
     mask[:, :240] = 255
     Image.fromarray(mask).save(tmp_path / "mask.png")
-    views = [replace(view, mask=PhotoMask(tmp_path / "mask.png")) for view in all_views(capture)]
+    views = [replace(view, mask=PhotoMask(tmp_path / "mask.png")) for view in sorted_views(capture)]
     matches = match_photos(views)
     assert matches.pairs and all(p[:, 0].max() < 241 for pair in matches.pixels for p in pair)
     assert pose_error(matches, views).median < 0.5
@@ -227,7 +227,7 @@ def test_a_written_data_set_is_read_back(capture, tmp_path):
     write_transforms(capture, tmp_path / "out")
     found = load_dataset(tmp_path / "out", downscale=1)
     assert [view.name for view in found.test] == [f"images/{view.name}" for view in capture.test]
-    for one, other in zip(all_views(found), all_views(capture), strict=True):
+    for one, other in zip(sorted_views(found), sorted_views(capture), strict=True):
         np.testing.assert_allclose(one.camera.c2w, other.camera.c2w, atol=1e-12)
         assert one.camera.fx == pytest.approx(other.camera.fx) and one.camera.model == other.camera.model
         np.testing.assert_allclose(one.camera.distortion[:4], other.camera.distortion[:4])

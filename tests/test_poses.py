@@ -20,11 +20,11 @@ from cagefield.datasets import load_dataset
 from cagefield.datasets.dataset_loader import has_photos_alone
 from cagefield.datasets.raw_photos import (
     RawPhoto,
+    extract_video_frames,
     find_raw_photos,
     sharpest_frames,
     sharpness,
-    upright,
-    video_frames,
+    write_upright,
 )
 from cagefield.datasets.sfm import (
     features,
@@ -36,7 +36,7 @@ from cagefield.datasets.sfm import (
 from cagefield.datasets.sfm.ambiguity_check import Fold
 from cagefield.datasets.sfm.pose_verification import Verification
 from cagefield.datasets.sfm.sfm_workspace import work_folder
-from cagefield.datasets.sfm.structure_from_motion import PosesReport, is_made_of, make_poses
+from cagefield.datasets.sfm.structure_from_motion import PosesReport, is_built_from, make_poses
 from cagefield.errors import DatasetError
 from commands import refused
 from posed_photos import distance_to_textures, photo_of_textures, ring, save
@@ -170,13 +170,13 @@ def test_an_interrupted_run_goes_on(photos, tmp_path, monkeypatch, capfd):
         make_poses(source, target, on_progress=stop)
     assert work_folder(target).is_dir() and not target.exists()
     notes = []
-    monkeypatch.setattr(sfm_workspace, "upright", None)  # no photo is read again
+    monkeypatch.setattr(sfm_workspace, "write_upright", None)  # no photo is read again
     report = make_poses(source, target, on_progress=lambda done, note: notes.append(note))
     assert report.placed == 4 and not any("read" in note for note in notes)
     assert capfd.readouterr() == ("", "")  # COLMAP's log stays silent
-    assert is_made_of(target, source)
+    assert is_built_from(target, source)
     (source / "00.png").touch()
-    assert not is_made_of(target, source)
+    assert not is_built_from(target, source)
 
 
 def test_ctrl_c_ends_a_call_of_pycolmap_s_and_waits_for_its_end():
@@ -265,7 +265,7 @@ def test_reasons_why_photos_found_no_place():
         def reg_image_ids(self):
             return [7]
 
-    found = registration_report.reasons_left_out(
+    found = registration_report.explain_unregistered(
         raw, {0, 1}, [Other()], registration_report.Matches(counts, flat)
     )
     assert found == {
@@ -284,14 +284,14 @@ def test_photos_of_one_size_and_focal_length_share_a_camera(tmp_path):
         Image.new("RGB", (400, 300), (index, 9, 9)).save(tmp_path / f"{index}.jpg", exif=exif)
     Image.new("RGB", (400, 300)).save(tmp_path / "3.png")
     Image.new("RGB", (300, 400)).save(tmp_path / "4.png")
-    raw = [upright(file, file.name, tmp_path / "out") for file in find_raw_photos(tmp_path)]
-    cameras, numbers = structure_from_motion.camera_guesses(raw)
+    raw = [write_upright(file, file.name, tmp_path / "out") for file in find_raw_photos(tmp_path)]
+    cameras, numbers = structure_from_motion.guess_cameras(raw)
     assert numbers == [0, 0, 0, 1, 2]
     # 26 mm on film of 36 x 24 mm, whose diagonal is 43.27 mm, on a photo whose diagonal is 500 pixels
     assert cameras[0].params[0] == pytest.approx(26 * 500 / 43.267) and cameras[0].has_prior_focal_length
     assert cameras[1].params[0] == pytest.approx(1.2 * 400) and not cameras[1].has_prior_focal_length
     assert {camera.model.name for camera in cameras} == {"SIMPLE_RADIAL"}
-    many, _ = structure_from_motion.camera_guesses(raw[:3] * 4)
+    many, _ = structure_from_motion.guess_cameras(raw[:3] * 4)
     assert many[0].model.name == "RADIAL"  # one focal length: the pixels are square
 
 
@@ -304,11 +304,11 @@ def test_many_photos_are_matched_with_neighbours_and_with_those_alike(photos, tm
     shuffled = [names[i] for i in (0, 4, 1, 5, 2, 6, 3, 7)]
     features.create_database(database, [camera], [features.Photo(name, 0) for name in shuffled])
     features.extract(database, photos, shuffled, features=1000, longer_side=1000)
-    pairs = features.likely_pairs(database, 8, neighbours=1, alike=2)
+    pairs = features.select_likely_pairs(database, 8, neighbors=1, similar=2)
     assert {(i, i + 1) for i in range(7)} <= set(pairs)
     place = [names.index(name) for name in shuffled]
-    alike = [abs(place[i] - place[j]) for i, j in pairs if j - i > 1]
-    assert alike and np.mean(alike) < 2.0  # chance would give 3
+    similar = [abs(place[i] - place[j]) for i, j in pairs if j - i > 1]
+    assert similar and np.mean(similar) < 2.0  # chance would give 3
     assert all(i < j for i, j in pairs) and len(pairs) < 21
 
 
@@ -342,7 +342,7 @@ def test_frames_of_a_video(tmp_path):
     for frame in frames:
         writer.send(np.ascontiguousarray(frame))
     writer.close()
-    found = video_frames(video, 3, tmp_path / "frames")
+    found = extract_video_frames(video, 3, tmp_path / "frames")
     assert len(found) == 3
     for file, index in zip(found, sharp, strict=True):
         with Image.open(file) as image:
@@ -350,7 +350,7 @@ def test_frames_of_a_video(tmp_path):
             assert np.asarray(image).mean() == pytest.approx(8 * index + 40, abs=3)
     (tmp_path / "cut.mp4").write_bytes(video.read_bytes()[:200])
     with pytest.raises(DatasetError, match=r"cut.mp4: holds 0 frames that can be read"):
-        video_frames(tmp_path / "cut.mp4", 3, tmp_path / "none")
+        extract_video_frames(tmp_path / "cut.mp4", 3, tmp_path / "none")
     assert has_photos_alone(video)
 
 

@@ -23,11 +23,11 @@ from cagefield.datasets.sfm import colmap_process, features, sfm_workspace, stru
 from cagefield.datasets.sfm.colmap_process import StoppedError
 from cagefield.datasets.sfm.database_check import recorded_digest
 from cagefield.datasets.sfm.sfm_workspace import (
-    plainly_named,
+    link_plain_names,
+    prepare_photos,
     prepare_work,
     remove_work,
     work_folder,
-    work_photos,
 )
 from cagefield.datasets.sfm.structure_from_motion import make_poses
 from cagefield.errors import DatasetError
@@ -114,7 +114,7 @@ def test_a_stop_says_what_is_kept_and_the_same_command_continues(
         ):
             make_poses(photos, target)
     assert not target.exists()
-    monkeypatch.setattr(sfm_workspace, "upright", None)  # no photo is read again
+    monkeypatch.setattr(sfm_workspace, "write_upright", None)  # no photo is read again
     assert make_poses(photos, target).placed == 4
     assert not work_folder(target).exists()
 
@@ -236,26 +236,32 @@ def test_a_folder_in_a_databases_place_is_moved_away(stopped: Path, tmp_path: Pa
     assert make_poses(folder / "photos", folder / "data").placed == 4
 
 
-DAMAGED = [b"{}", b"[]", b"nope", b"\xff\xfe\x80\x00", b'{"photos": [{"name": "a.png"}], "unreadable": {}}']
+DECODING_ERRORS = [
+    b"{}",
+    b"[]",
+    b"nope",
+    b"\xff\xfe\x80\x00",
+    b'{"photos": [{"name": "a.png"}], "unreadable": {}}',
+]
 
 
-@pytest.mark.parametrize("content", DAMAGED)
+@pytest.mark.parametrize("content", DECODING_ERRORS)
 def test_photos_are_read_again_where_their_list_is_damaged(tmp_path: Path, content: bytes) -> None:
     photos, work = photos_alone(tmp_path / "photos"), tmp_path / "data.work"
     prepare_work(work, {"files": 1})
-    found = work_photos(photos, work, 1, lambda done, note: None)
-    plainly_named(found[0], work)
+    found = prepare_photos(photos, work, 1, lambda done, note: None)
+    link_plain_names(found[0], work)
     (work / "database.db").touch()
     (work / "photos.json").write_bytes(content)
-    assert work_photos(photos, work, 1, lambda done, note: None) == found
+    assert prepare_photos(photos, work, 1, lambda done, note: None) == found
     assert (work / "database.db").is_file()  # of the same photos
     (work / "photos.json").write_bytes(content)
     next(photos.glob("*.png")).unlink()
-    assert len(work_photos(photos, work, 1, lambda done, note: None)[0]) == len(found[0]) - 1
+    assert len(prepare_photos(photos, work, 1, lambda done, note: None)[0]) == len(found[0]) - 1
     assert not (work / "database.db").exists()
 
 
-@pytest.mark.parametrize("content", DAMAGED[1:4])
+@pytest.mark.parametrize("content", DECODING_ERRORS[1:4])
 def test_work_of_nobody_knows_what_is_left_alone(tmp_path: Path, content: bytes) -> None:
     work = tmp_path / "data.work"
     prepare_work(work, {"files": 1})
@@ -382,8 +388,8 @@ def test_pictures_for_colmap_are_whole_or_not_there(tmp_path: Path, monkeypatch:
     with monkeypatch.context() as patch:
         patch.setattr(Image.Image, "save", half)
         with pytest.raises(OSError, match="No space left"):
-            plainly_named([photo], tmp_path)
+            link_plain_names([photo], tmp_path)
     assert list((tmp_path / "colmap").iterdir()) == []
-    assert plainly_named([photo], tmp_path) == ["000000.png"]
+    assert link_plain_names([photo], tmp_path) == ["000000.png"]
     with Image.open(tmp_path / "colmap" / "000000.png") as image:
         assert image.size == (8, 8) and image.mode == "RGB"

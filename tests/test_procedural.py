@@ -16,7 +16,7 @@ from cagefield.geometry.cage import Cage
 from cagefield.images.image_files import read_image
 from cagefield.images.metrics import psnr
 from cagefield.procedural import SCENES, ProceduralScene, make_scene, procedural_scene, viewpoints
-from cagefield.procedural.parts import Part, Primitive, affine, place
+from cagefield.procedural.parts import Part, Primitive, affine_matrix, pose_matrix
 from cagefield.procedural.shapes import (
     Box,
     Cylinder,
@@ -156,7 +156,7 @@ def test_traced_sphere_is_where_the_quadratic_says():
     middle = directions @ to_center
     square = radius**2 - to_center @ to_center + middle**2
     expected = np.where(square > 0, middle - np.sqrt(np.maximum(square, 0)), np.inf).reshape(40, 40)
-    depth = hits_of(one(Sphere(radius), place(center)), camera)
+    depth = hits_of(one(Sphere(radius), pose_matrix(center)), camera)
     # a ray arrives within 2e-4 of the surface; where it grazes it, that is up to sqrt(2 radius 2e-4) early
     clear = (np.abs(square) > 0.02).reshape(40, 40)
     np.testing.assert_array_equal(np.isfinite(depth)[clear], np.isfinite(expected)[clear])
@@ -167,7 +167,7 @@ def test_traced_sphere_is_where_the_quadratic_says():
 
 def test_traced_stretched_sphere_is_an_ellipsoid():
     """Rays meet the ellipsoid where they meet the unit sphere in its own frame."""
-    pose = place((0.1, 0, 0), (20, 30, 40), (0.5, 0.3, 0.15))
+    pose = pose_matrix((0.1, 0, 0), (20, 30, 40), (0.5, 0.3, 0.15))
     camera = view()
     inverse = np.linalg.inv(pose)
     origin = inverse[:3, :3] @ camera.origin + inverse[:3, 3]
@@ -184,14 +184,14 @@ def test_traced_stretched_sphere_is_an_ellipsoid():
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_nearest_instance_hides_the_other(order):
-    poses = np.stack([place((0.8, 0, 0)), place((-0.8, 0, 0))])[::order]
+    poses = np.stack([pose_matrix((0.8, 0, 0)), pose_matrix((-0.8, 0, 0))])[::order]
     pair = ProceduralScene("pair", (Part("balls", (Primitive(Sphere(0.3), PLAIN, poses),)),))
     camera = view(21, eye=(4, 0, 0), fov_x=0.3)
     assert hits_of(pair, camera)[10, 10] == pytest.approx(4 - 0.8 - 0.3, abs=1e-3)
 
 
 def test_field_distance_is_euclidean_for_uniform_scales():
-    ball = one(Sphere(0.5), place((0.1, 0.2, 0), scale=0.4))
+    ball = one(Sphere(0.5), pose_matrix((0.1, 0.2, 0), scale=0.4))
     points = np.random.default_rng(0).uniform(-0.3, 0.5, (3000, 3)).astype(np.float32)
     expected = np.linalg.norm(points - np.float32([0.1, 0.2, 0]), axis=1) - 0.2
     distance, owner, _ = ball.field(eps=0.01).distance(points)
@@ -202,7 +202,7 @@ def test_field_distance_is_euclidean_for_uniform_scales():
 
 
 def test_field_distance_is_first_order_for_stretched_parts():
-    pose = place((0, 0, 0), (20, 30, 40), (0.5, 0.3, 0.1))
+    pose = pose_matrix((0, 0, 0), (20, 30, 40), (0.5, 0.3, 0.1))
     u = np.random.default_rng(0).normal(size=(500, 3))
     u /= np.linalg.norm(u, axis=1, keepdims=True)
     normals = u @ np.linalg.inv(pose[:3, :3])
@@ -218,7 +218,7 @@ def test_opacity_of_an_antialiased_edge_is_the_covered_share():
     camera = Camera.look_at((0, -200, 0), (0, 0, 0), width=20, height=20, fov_x=0.01)
     width = 200 * 2 * np.tan(0.005)
     edge = 0.3 / 20 * width
-    frame = one(Box((1.2, 0.5, 1.2)), place((edge - 1.2, 0, 0))).photograph(camera, supersample=8)
+    frame = one(Box((1.2, 0.5, 1.2)), pose_matrix((edge - 1.2, 0, 0))).photograph(camera, supersample=8)
     # columns 0 to 9 and three tenths of column 10, in steps of an eighth; the near face is 0.25 % larger
     np.testing.assert_allclose(frame.opacity[:, :10], 1)
     np.testing.assert_allclose(frame.opacity[:, 10], 0.3, atol=0.5 / 8 + 0.01)
@@ -264,9 +264,11 @@ def test_part_bounds_hold_what_is_traced(scene):
 def test_whole_scene_moved_looks_like_the_camera_moved(scene):
     """Carried colours: a rigid motion of everything equals the inverse motion of the camera."""
     camera = view(48, eye=(2.5, -2.6, 1.7), fov_x=0.7)
-    motion = affine((0.1, -0.05, 0.08), (0.3, -0.2, 0.5))
+    motion = affine_matrix((0.1, -0.05, 0.08), (0.3, -0.2, 0.5))
     angles, offset = (0.3, -0.2, 0.5), (0.1, -0.05, 0.08)
-    moved = scene.move(scene.part_names, translate=offset, rotate=angles, pivot=(0, 0, 0)).carrying_light()
+    moved = scene.move(
+        scene.part_names, translate=offset, rotate=angles, pivot=(0, 0, 0)
+    ).with_modeled_light()
     seen_by_moved = camera.with_c2w(motion @ camera.c2w)
     still, turned = scene.photograph(camera), moved.photograph(seen_by_moved)
     # rays and distances are rounded differently, so single subsamples at silhouettes and texture edges change
@@ -280,7 +282,7 @@ def test_translated_part_keeps_its_colours():
     offset = np.array([0.2, 0.3, -0.25])
     moved = ball.move("thing", translate=offset)
     camera = view()
-    shifted = camera.with_c2w(affine(offset) @ camera.c2w)
+    shifted = camera.with_c2w(affine_matrix(offset) @ camera.c2w)
     np.testing.assert_allclose(moved.photograph(shifted).rgb, ball.photograph(camera).rgb, atol=2e-3)
 
 
@@ -288,15 +290,15 @@ def test_turned_part_is_relit_unless_it_carries_its_light():
     box = one(Box((0.4, 0.4, 0.4)))
     turned = box.move("thing", rotate=(np.pi, 0, 0))
     camera = view(fov_x=0.3)
-    upside_down = camera.with_c2w(affine(rotate=(np.pi, 0, 0)) @ camera.c2w)
+    upside_down = camera.with_c2w(affine_matrix(rotate=(np.pi, 0, 0)) @ camera.c2w)
     original = box.photograph(camera).rgb
-    carried = turned.carrying_light().photograph(upside_down).rgb
+    carried = turned.with_modeled_light().photograph(upside_down).rgb
     np.testing.assert_allclose(carried, original, atol=0.02)
     assert np.abs(turned.photograph(upside_down).rgb - original).max() > 0.1
 
 
 def test_move_scales_about_the_centre_of_the_part():
-    box = one(Box((0.2, 0.1, 0.3)), place((0.5, 0, 0.1)))
+    box = one(Box((0.2, 0.1, 0.3)), pose_matrix((0.5, 0, 0.1)))
     low, high = box.move("thing", translate=(0, 0.2, 0), scale=(1, 2, 0.5)).part_bounds("thing")
     np.testing.assert_allclose((low + high) / 2, (0.5, 0.2, 0.1), atol=1e-9)
     np.testing.assert_allclose(high - low, (0.4, 0.4, 0.3), atol=1e-9)
@@ -324,8 +326,8 @@ def test_occlusion_is_open_on_a_ball_and_darker_in_a_corner():
     normals = directions.astype(np.float32)
     # distances are interpolated on a lattice of .025, which a ball of .3 bends by about .025^2 / .3 = .002
     assert ball.occlusion(0.3 * normals.T, normals.T).min() > 0.93
-    floor = Part("floor", (Primitive(Box((1, 1, 0.1)), PLAIN, place((0, 0, -0.1))[None]),))
-    wall = Part("wall", (Primitive(Box((0.1, 1, 0.5)), PLAIN, place((-0.1, 0, 0.5))[None]),))
+    floor = Part("floor", (Primitive(Box((1, 1, 0.1)), PLAIN, pose_matrix((0, 0, -0.1))[None]),))
+    wall = Part("wall", (Primitive(Box((0.1, 1, 0.5)), PLAIN, pose_matrix((-0.1, 0, 0.5))[None]),))
     corner = ProceduralScene("corner", (floor, wall))
     points = np.array([[0.02, 0, 0], [0.1, 0, 0], [0.6, 0, 0]], np.float32)
     up = np.tile(np.float32([0, 0, 1]), (3, 1))
@@ -336,8 +338,8 @@ def test_occlusion_is_open_on_a_ball_and_darker_in_a_corner():
 
 
 def test_a_flattened_ball_darkens_what_is_as_near_as_it_is_and_no_box_around_it():
-    plate = Part("plate", (Primitive(Box((0.9, 0.9, 0.1)), PLAIN, place((0, 0, -0.1))[None]),))
-    disc = place((0, 0, 0.05), scale=(0.1, 0.1, 0.01))
+    plate = Part("plate", (Primitive(Box((0.9, 0.9, 0.1)), PLAIN, pose_matrix((0, 0, -0.1))[None]),))
+    disc = pose_matrix((0, 0, 0.05), scale=(0.1, 0.1, 0.01))
     still = ProceduralScene("still", (plate, Part("disc", (Primitive(Sphere(), PLAIN, disc[None]),))))
     # the disc's edge is as far away as its height in the first, and further than every tap in the others
     points = np.array([[0.15, 0, 0], [0.42, 0, 0], [0.3, 0.3, 0]], np.float32).T
@@ -347,10 +349,10 @@ def test_a_flattened_ball_darkens_what_is_as_near_as_it_is_and_no_box_around_it(
 
 
 def test_occlusion_anew_is_of_the_parts_where_they_stand():
-    plate = Part("plate", (Primitive(Box((0.9, 0.9, 0.1)), PLAIN, place((0, 0, -0.1))[None]),))
-    box = Part("box", (Primitive(Box((0.1, 0.1, 0.1)), PLAIN, place((-0.4, 0.013, 0.11))[None]),))
+    plate = Part("plate", (Primitive(Box((0.9, 0.9, 0.1)), PLAIN, pose_matrix((0, 0, -0.1))[None]),))
+    box = Part("box", (Primitive(Box((0.1, 0.1, 0.1)), PLAIN, pose_matrix((-0.4, 0.013, 0.11))[None]),))
     still = ProceduralScene("still", (plate, box))
-    anew = still.move("box", translate=(0.85, 0, 0)).with_its_own_occlusion()
+    anew = still.move("box", translate=(0.85, 0, 0)).with_new_occlusion()
     points = np.array([[-0.55, 0.013, 0], [0.3, 0.013, 0], [-0.1, -0.8, 0]], np.float32).T
     up = np.tile(np.float32([[0], [0], [1]]), 3)
     left, come, far = anew.occlusion(points, up)
@@ -364,7 +366,7 @@ def test_occlusion_anew_is_of_the_parts_where_they_stand():
     np.testing.assert_allclose(there.occlusion(points, up), (left, come, far), atol=0.02)
     again = anew.move("box", translate=(-0.85, 0, 0))
     assert again.occlusion is anew.occlusion
-    np.testing.assert_allclose(again.with_its_own_occlusion().occlusion(points, up), were, atol=1e-6)
+    np.testing.assert_allclose(again.with_new_occlusion().occlusion(points, up), were, atol=1e-6)
 
 
 @pytest.mark.parametrize(("name", "part"), [("digger", "cone"), ("microphone", "base"), ("plant", "flower")])
@@ -373,11 +375,11 @@ def test_occlusion_anew_changes_nothing_far_from_what_moved(name, part):
     camera = viewpoints(1, 64, lowest=scene.lowest)[0]
     photo = scene.photograph(camera, background="white").rgb
     np.testing.assert_allclose(
-        scene.with_its_own_occlusion().photograph(camera, background="white").rgb, photo, atol=1e-5
+        scene.with_new_occlusion().photograph(camera, background="white").rgb, photo, atol=1e-5
     )
     old, new = (
         each.photograph(camera, background="white").rgb
-        for each in (scene.remove(part), scene.remove(part).with_its_own_occlusion())
+        for each in (scene.remove(part), scene.remove(part).with_new_occlusion())
     )
     changed = np.abs(old - new).max(-1) > 4 / 255
     # though the box of the parts, where the lattice of distances begins, is another without the part
@@ -411,7 +413,7 @@ def test_really_moved_part_is_what_a_discrete_edit_makes(name, part, motion):
     center, size = scene.part_box(part, margin=0.002)
     edit = Edit(Cage.box(center, size), adjustment="discrete").scale(motion.get("scale", 1.0))
     edit = edit.rotate(motion.get("rotate", (0, 0, 0))).translate(motion["translate"])
-    moved = scene.move(part, **motion).carrying_light()
+    moved = scene.move(part, **motion).with_modeled_light()
     low, high = moved.part_bounds(part) - 0.05 * np.array([[1], [-1]])
     rng = np.random.default_rng(0)
     points = rng.uniform(np.minimum(low, center - size), np.maximum(high, center + size), (30000, 3))

@@ -9,7 +9,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cagefield.datasets.sfm import disambiguation, structure_from_motion
-from cagefield.datasets.sfm.disambiguation import are_in_order, contradicting, far_pairs, neighbourhood
+from cagefield.datasets.sfm.disambiguation import (
+    contradicting_pairs,
+    distant_pairs,
+    is_sequence,
+    neighborhood_size,
+)
 from cagefield.datasets.sfm.registration_report import Matches
 
 pycolmap = pytest.importorskip("pycolmap", reason="poses are found by pycolmap")
@@ -25,16 +30,16 @@ def _counts(n: int, reach: int, period: int | None = None) -> np.ndarray:
 
 def test_photos_in_order_are_told_from_others():
     ordered = _counts(40, 6)
-    assert are_in_order(ordered) and are_in_order(_counts(40, 6, period=20))
+    assert is_sequence(ordered) and is_sequence(_counts(40, 6, period=20))
     shuffle = np.random.default_rng(0).permutation(40)
-    assert not are_in_order(ordered[shuffle][:, shuffle])
-    assert not are_in_order(np.full((40, 40), 200))  # all see the same
-    assert not are_in_order(_counts(7, 6))
+    assert not is_sequence(ordered[shuffle][:, shuffle])
+    assert not is_sequence(np.full((40, 40), 200))  # all see the same
+    assert not is_sequence(_counts(7, 6))
 
 
 def test_far_pairs_are_those_beyond_the_neighbours():
-    assert [neighbourhood(n) for n in (9, 24, 40, 71, 500)] == [3, 3, 5, 8, 8]
-    found = far_pairs(_counts(40, 6, period=20))
+    assert [neighborhood_size(n) for n in (9, 24, 40, 71, 500)] == [3, 3, 5, 8, 8]
+    found = distant_pairs(_counts(40, 6, period=20))
     assert {j - i for i, j in found} == set(range(16, 25))
 
 
@@ -44,7 +49,7 @@ def test_pairs_half_a_turn_off_contradict_and_those_of_a_drifting_chain_do_not()
     chain = dict(enumerate(drifting))
     relative = {(i, i + 36): true[i + 36] @ true[i].T for i in range(4)}  # a full turn later, 22 degrees off
     relative |= {(i, i + 18): np.eye(3) for i in range(20)}  # the back, taken for the front
-    assert contradicting(chain, relative) == {(i, i + 18) for i in range(20)}
+    assert contradicting_pairs(chain, relative) == {(i, i + 18) for i in range(20)}
 
 
 @pytest.fixture(scope="module")
@@ -67,13 +72,13 @@ def _all_pairs(count: int) -> set[tuple[int, int]]:
 def test_relative_rotations_of_true_matches_agree_with_the_model(synthetic):
     path, model = synthetic
     relative = disambiguation.relative_rotations(path, model, _all_pairs(12))
-    rotations = disambiguation.rotations_of(model)
+    rotations = disambiguation.model_rotations(model)
     assert len(relative) > 40
     for (i, j), rotation in relative.items():
         np.testing.assert_allclose(rotation, rotations[j] @ rotations[i].T, atol=0.02)
-    assert contradicting(rotations, relative) == set()
+    assert contradicting_pairs(rotations, relative) == set()
     turned = {**rotations, 5: rotations[5] @ Rotation.from_euler("Y", 120, degrees=True).as_matrix()}
-    assert {5} == set.intersection(*({i, j} for i, j in contradicting(turned, relative)))
+    assert {5} == set.intersection(*({i, j} for i, j in contradicting_pairs(turned, relative)))
 
 
 def _verified(path: Path) -> int:
@@ -84,7 +89,7 @@ def _verified(path: Path) -> int:
 def test_removed_pairs_are_gone_from_the_copy_alone(synthetic):
     path, _ = synthetic
     before = _verified(path)
-    copy = structure_from_motion.without_pairs(path, {(0, 1), (3, 7)})
+    copy = structure_from_motion.copy_without_pairs(path, {(0, 1), (3, 7)})
     assert _verified(copy) == before - 2 and _verified(path) == before
 
 
@@ -102,10 +107,10 @@ def test_the_unfolded_model_must_not_lose_photos_or_points(tmp_path, monkeypatch
     monkeypatch.setattr(structure_from_motion, "_map", lambda *_: [next(mapped)])
     monkeypatch.setattr(disambiguation, "remove_pairs", lambda _, pairs: removed.append(pairs))
     monkeypatch.setattr(disambiguation, "relative_rotations", lambda *_: {})
-    monkeypatch.setattr(disambiguation, "rotations_of", lambda _: {})
-    monkeypatch.setattr(disambiguation, "contradicting", lambda *_: {(2, 20)})
+    monkeypatch.setattr(disambiguation, "model_rotations", lambda _: {})
+    monkeypatch.setattr(disambiguation, "contradicting_pairs", lambda *_: {(2, 20)})
     counts = _counts(40, 6, period=20)
     matches = Matches(counts, np.zeros_like(counts, dtype=bool))
-    (found,), _ = structure_from_motion.unfolded_models(tmp_path, matches, 0, lambda *_: None)
+    (found,), _ = structure_from_motion.build_unambiguous_models(tmp_path, matches, 0, lambda *_: None)
     assert found is models["pruned" if wins else "plain"]
-    assert removed == [far_pairs(counts), {(2, 20)}]
+    assert removed == [distant_pairs(counts), {(2, 20)}]

@@ -6,8 +6,8 @@ import pytest
 
 from cagefield.datasets import load_dataset
 from cagefield.datasets.training_resolution import (
-    at_training_resolution,
     describe_resolution,
+    shrink_to_training_resolution,
     training_factor,
 )
 from posed_photos import textured_capture
@@ -35,7 +35,7 @@ def test_the_factor_is_the_whole_number_nearest_to_the_side_that_the_time_allows
 
 def test_the_data_set_is_shrunk_from_whole_photos_and_said(tmp_path):
     textured_capture(tmp_path, 4, size=(2000, 1500))
-    found = at_training_resolution(load_dataset(tmp_path), 5.0)
+    found = shrink_to_training_resolution(load_dataset(tmp_path), 5.0)
     camera = found.train[0].camera
     assert (camera.width, camera.height) == (1000, 750) and found.train[0].load().shape == (750, 1000, 3)
     assert describe_resolution(found) == "photos of 2000x1500 are trained at 1000x750 (--downscale 2)"

@@ -13,14 +13,14 @@ from cagefield.datasets import load_dataset
 from cagefield.errors import DatasetError, SceneError
 from cagefield.images.image_files import read_image
 from cagefield.procedural import CAPTURES, ProceduralScene, capture, make_capture
-from cagefield.procedural.hand_held import Phone, developed, exposures, picture
-from cagefield.procedural.parts import Part, Primitive, place
+from cagefield.procedural.hand_held import Phone, develop_photo, exposure_gains, render_image
+from cagefield.procedural.parts import Part, Primitive, pose_matrix
 from cagefield.procedural.room_light import Room
 from cagefield.procedural.rooms import ROOMS
 from cagefield.procedural.shapes import Box, Sphere
-from cagefield.procedural.srgb import encoded, linear
+from cagefield.procedural.srgb import decode_srgb, encode_srgb
 from cagefield.procedural.textures import Plain
-from cagefield.procedural.tracks import NOISE, tracks
+from cagefield.procedural.tracks import OBSERVATION_NOISE_PIXELS, simulate_tracks
 
 RED, GREY = Plain((0.8, 0.1, 0.1), 0.0), Plain((0.3, 0.3, 0.3), 0.0)
 
@@ -33,12 +33,12 @@ def small(tmp_path_factory):
 
 def board(mirror: float) -> Part:
     """A polished slab whose top face is z = 0."""
-    slab = Primitive(Box((2.0, 2.0, 0.1)), GREY, place((0, 0, -0.1))[None], (0.0, 8.0), mirror=mirror)
+    slab = Primitive(Box((2.0, 2.0, 0.1)), GREY, pose_matrix((0, 0, -0.1))[None], (0.0, 8.0), mirror=mirror)
     return Part("board", (slab,))
 
 
 def ball(height: float) -> Part:
-    lit = Primitive(Sphere(0.3), RED, place((0, 0, height))[None], luminous=1.0)
+    lit = Primitive(Sphere(0.3), RED, pose_matrix((0, 0, height))[None], luminous=1.0)
     return Part("ball", (lit,))
 
 
@@ -73,7 +73,7 @@ def test_every_ray_ends_and_the_walls_are_smooth_but_not_of_one_colour(name):
     for camera in cameras:
         low, high = np.array(plan.scene.room.low), np.array(plan.scene.room.high)
         assert (camera.origin > low).all() and (camera.origin < high).all()
-    rgb, distance = picture(plan.scene, cameras[0])
+    rgb, distance = render_image(plan.scene, cameras[0])
     assert np.isfinite(distance).all() and distance.min() > 0.1
     assert rgb.min() >= 0 and rgb.std() > 0.05
     scene, room = plan.scene, plan.scene.room
@@ -89,15 +89,15 @@ def test_every_ray_ends_and_the_walls_are_smooth_but_not_of_one_colour(name):
 
 def test_light_falls_from_the_window_and_things_cast_a_shadow():
     room = Room((-4, -4, 0), (4, 4, 5), ((-1, 2), (1, 4)), ("floor",))
-    floor = Part("floor", (Primitive(Box((5, 5, 0.2)), GREY, place((0, 0, -0.2))[None], (0, 8)),))
-    post = Part("post", (Primitive(Box((0.3, 0.1, 0.8)), GREY, place((0, 1.0, 0.8))[None], (0, 8)),))
+    floor = Part("floor", (Primitive(Box((5, 5, 0.2)), GREY, pose_matrix((0, 0, -0.2))[None], (0, 8)),))
+    post = Part("post", (Primitive(Box((0.3, 0.1, 0.8)), GREY, pose_matrix((0, 1.0, 0.8))[None], (0, 8)),))
     down = np.array([[0, 0, 0], [0, 0, 0], [-1, -1, -1]], np.float32)[:, :1]
 
     def floor_at(scene: ProceduralScene, x: float, y: float) -> float:
         return float(scene.shoot(np.array([x, y, 1.9]), down)[0].mean())
 
     lit = ProceduralScene("lit", (floor, Part("far", (dataclasses.replace(
-        post.primitives[0], poses=place((3.5, -3.5, 0.8))[None]),))), room=room)  # fmt: skip
+        post.primitives[0], poses=pose_matrix((3.5, -3.5, 0.8))[None]),))), room=room)  # fmt: skip
     shaded = ProceduralScene("shaded", (floor, post), room=room)
     assert floor_at(lit, 0, 2.0) > floor_at(lit, 0, -3.0) + 0.02
     # behind the post, seen from the window, and beside it
@@ -112,7 +112,7 @@ def test_edges_are_looked_at_more_closely_and_plain_parts_once():
     plan = capture("room-chair")
     camera = plan.cameras(plan.phone.resized(96), 3, 0)[1]
     scene = plan.scene
-    rgb, distance = picture(scene, camera)
+    rgb, distance = render_image(scene, camera)
     fine, once = scene.photograph(camera, supersample=2).rgb, scene.photograph(camera, supersample=1)
     np.testing.assert_array_equal(distance, once.depth)
     edge = np.abs(rgb - once.rgb).max(-1) > 0
@@ -124,19 +124,19 @@ def test_edges_are_looked_at_more_closely_and_plain_parts_once():
 
 def test_a_photo_is_linear_in_the_exposure_and_as_noisy_as_stated():
     values = np.linspace(0, 1, 11)
-    np.testing.assert_allclose(encoded(linear(values)), values, atol=1e-12)
-    np.testing.assert_allclose(linear(np.array([0.5])), 0.21404114, rtol=1e-6)
+    np.testing.assert_allclose(encode_srgb(decode_srgb(values)), values, atol=1e-12)
+    np.testing.assert_allclose(decode_srgb(np.array([0.5])), 0.21404114, rtol=1e-6)
     rng = np.random.RandomState(0)
     grey = np.full((200, 200, 3), 0.6, np.float32)
-    bright = developed(grey, np.float32([1.3, 1.3, 1.3]), rng) / 255
-    assert bright.mean() == pytest.approx(encoded(1.3 * linear(np.array(0.6))), abs=2e-3)
+    bright = develop_photo(grey, np.float32([1.3, 1.3, 1.3]), rng) / 255
+    assert bright.mean() == pytest.approx(encode_srgb(1.3 * decode_srgb(np.array(0.6))), abs=2e-3)
     assert 0.003 < bright.std() < 0.02
     pictures = [grey, np.full_like(grey, 0.7), np.full_like(grey, 0.5)]
-    gains = exposures(pictures, 1.0, rng)
-    after = [linear(np.float64(p)).mean() * g.mean() for p, g in zip(pictures, gains, strict=True)]
+    gains = exposure_gains(pictures, 1.0, rng)
+    after = [decode_srgb(np.float64(p)).mean() * g.mean() for p, g in zip(pictures, gains, strict=True)]
     # chance of .04 and colour of .012 are left
     assert np.ptp(np.log(after)) < 0.3
-    assert np.exp(np.log(exposures(pictures, 0.0, rng)).mean()) == pytest.approx(1.0, abs=0.05)
+    assert np.exp(np.log(exposure_gains(pictures, 0.0, rng)).mean()) == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_capture_is_read_as_photos_without_alpha_in_the_rooms_world(small):
@@ -152,7 +152,7 @@ def test_a_capture_is_read_as_photos_without_alpha_in_the_rooms_world(small):
     assert np.array_equal(read.c2w, cameras[8].c2w) and (read.fx, read.cy) == (cameras[8].fx, 80.0)
     assert read_image(data.test[0].image_path).shape == (160, 90, 3)
     truth = np.load(small / "depth/frame_00009.npy")
-    np.testing.assert_array_equal(truth, picture(plan.scene, cameras[8])[1])
+    np.testing.assert_array_equal(truth, render_image(plan.scene, cameras[8])[1])
     assert data.test[0].camera.distortion[:2] == (0.045, -0.02)
     values = json.loads((small / "transforms.json").read_text())
     assert values["camera_model"] == "OPENCV" and values["frames"][0]["colmap_im_id"] == 1
@@ -198,7 +198,7 @@ def test_tracks_have_the_stated_noise_and_ignore_what_is_plain():
         ink = np.exp(-((wall[:, None] - spots) ** 2).sum(-1) / (2 * 0.03**2)).max(1)
         photos.append(np.repeat((230 - 200 * ink).astype(np.uint8).reshape(120, 120, 1), 3, 2))
         depths.append(t.reshape(120, 120).astype(np.float32))
-    found = tracks(photos, depths, cameras, seed=0)
+    found = simulate_tracks(photos, depths, cameras, seed=0)
     assert len(spots) / 2 < len(found) < 3 * len(spots)
     assert np.abs(found.positions[:, 0]).min() > 0.15
     # .7 pixels of .024 units each, over at least three rays that cross at up to 28 degrees
@@ -210,17 +210,17 @@ def test_tracks_have_the_stated_noise_and_ignore_what_is_plain():
         square.append((at - found.pixel[mine]) ** 2)
     # triangulation takes up three degrees of freedom of a point's 2 k
     rms = np.sqrt(np.concatenate(square).mean())
-    assert 0.5 * NOISE < rms < 1.05 * NOISE
+    assert 0.5 * OBSERVATION_NOISE_PIXELS < rms < 1.05 * OBSERVATION_NOISE_PIXELS
     assert found.errors.mean() == pytest.approx(np.sqrt(2) * rms, rel=0.2)
     plain = [np.full((120, 120, 3), 200, np.uint8)] * 7
-    assert len(tracks(plain, depths, cameras)) == 0
+    assert len(simulate_tracks(plain, depths, cameras)) == 0
 
 
 def test_captures_of_a_moved_part_differ_where_it_was():
     plan = capture("room-digger")
     camera = plan.cameras(plan.phone.resized(64), 8, 0)[3]
     still, moved = plan.scene, plan.scene.move("cone", translate=(0, -0.97, 0))
-    before, after = picture(still, camera)[0], picture(moved, camera)[0]
+    before, after = render_image(still, camera)[0], render_image(moved, camera)[0]
     changed = np.abs(before - after).max(-1) > 0.05
     assert 0 < changed.mean() < 0.1
 

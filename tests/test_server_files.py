@@ -25,7 +25,7 @@ from cagefield.server.web import splat_file_scene, uploads
 from cagefield.server.web.app import application
 from cagefield.server.web.launch import open_scene
 from cagefield.server.web.security import Guard
-from cagefield.server.web.splat_file_scene import KEPT_DAYS, opened_folder, scene_of_file
+from cagefield.server.web.splat_file_scene import KEPT_DAYS, open_mask_folder, scene_of_file
 from editor_server import EditorServer, PageClient, editor_server, page
 from scenes import ball_scene
 from splat_damage import ksplat_of
@@ -104,7 +104,7 @@ def test_save_as_makes_the_scene_beside_the_file(file: Path) -> None:
     coordinator.session.load_edits(EDIT, True)
     coordinator.save()
     assert len(Scene.open(file.parent / "mine").edits) == 2
-    assert not list(opened_folder().glob(".*autosave.json"))
+    assert not list(open_mask_folder().glob(".*autosave.json"))
 
 
 def test_a_scenes_path_is_not_a_files(file: Path, tmp_path: Path) -> None:
@@ -265,7 +265,7 @@ def test_what_is_no_file_of_splats_is_one_line(scene: Path, name: str, content: 
     answer = asyncio.run(posted(scene, name, content))
     assert answer.status_code == 400 and line in answer.text and "\n" not in answer.text
     assert "Errno" not in answer.text and tempfile.gettempdir() not in answer.text
-    assert not list(opened_folder().glob("*"))
+    assert not list(open_mask_folder().glob("*"))
 
 
 def test_a_page_that_hangs_up_amid_a_file_is_no_error(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.images.metrics import WINDOW as METRIC_WINDOW
+from cagefield.images.metrics import SSIM_WINDOW_PIXELS as METRIC_WINDOW
 from cagefield.images.metrics import ssim
 from cagefield.rendering.splats.rasterizer import kernels, tiled, untiled
 from cagefield.training.splats.kernels.ssim import MOMENT_PLANES, WINDOW_PIXELS, add_ssim_gradient

@@ -10,7 +10,12 @@ import pytest
 
 from cagefield import Scene, load_dataset
 from cagefield.datasets import Dataset
-from cagefield.datasets.nerf_normalization import in_ndc_world, in_unit_cube, ndc_box, why_not_ndc
+from cagefield.datasets.nerf_normalization import (
+    ndc_box,
+    ndc_obstacle,
+    normalize_to_ndc,
+    normalize_to_unit_cube,
+)
 from cagefield.errors import CagefieldError, DatasetError
 from cagefield.fields.contraction import contract
 from cagefield.procedural import make_scene
@@ -70,7 +75,7 @@ def test_moving_a_capture_changes_no_picture(forward) -> None:
     """A world point is seen at the same pixels before and after, and `source_to_world` follows."""
     dataset = load_dataset(forward)
     source = np.array([[0.5, 0.1, -6.0], [-1.0, 2.0, -11.0]])
-    for moved in (in_ndc_world(dataset)[0], in_unit_cube(dataset)):
+    for moved in (normalize_to_ndc(dataset)[0], normalize_to_unit_cube(dataset)):
         for before, after in zip(dataset.train, moved.train, strict=True):
             pixels = [
                 view.camera.project(source @ data.source_to_world[:3, :3].T + data.source_to_world[:3, 3])[0]
@@ -135,7 +140,7 @@ def test_bounded_scenes_stay_as_they_are(tmp_path) -> None:
 
 def test_ndc_are_refused_where_they_do_not_suit(forward, around, tmp_path) -> None:
     dataset = load_dataset(forward)
-    assert why_not_ndc(dataset) is None
+    assert ndc_obstacle(dataset) is None
     with pytest.raises(CagefieldError, match=r"cannot be trained in NDC: camera .* looks aside"):
         train_nerf(load_dataset(around), tiny(ndc=True))
     with pytest.raises(CagefieldError, match="nothing is known of its depth"):

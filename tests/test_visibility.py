@@ -6,7 +6,7 @@ import numpy as np
 from benchmarks.captures.visibility import uncovered_pixels, unseen_pixels
 
 from cagefield.cameras.camera import Camera, turntable
-from cagefield.procedural.parts import Part, Primitive, place
+from cagefield.procedural.parts import Part, Primitive, pose_matrix
 from cagefield.procedural.scene import ProceduralScene
 from cagefield.procedural.shapes import Box
 from cagefield.procedural.textures import Plain
@@ -15,8 +15,8 @@ GREY = Plain(np.array([0.5, 0.5, 0.5]))
 
 
 def box_on_plate() -> ProceduralScene:
-    plate = Part("plate", (Primitive(Box((0.8, 0.8, 0.1), 0.01), GREY, place((0, 0, -0.1))[None]),))
-    box = Part("box", (Primitive(Box((0.2, 0.2, 0.2), 0.01), GREY, place((0, 0, 0.2))[None]),))
+    plate = Part("plate", (Primitive(Box((0.8, 0.8, 0.1), 0.01), GREY, pose_matrix((0, 0, -0.1))[None]),))
+    box = Part("box", (Primitive(Box((0.2, 0.2, 0.2), 0.01), GREY, pose_matrix((0, 0, 0.2))[None]),))
     return ProceduralScene("box on plate", (plate, box))
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cagefield.cameras.camera import Camera
-from cagefield.procedural.parts import Part, apply
+from cagefield.procedural.parts import Part, transform_vectors
 from cagefield.procedural.scene import ProceduralScene
 from cagefield.procedural.tracing import trace
 from cagefield.typing import Mask
@@ -33,7 +33,7 @@ def unseen_pixels(
     """
     shape = (camera.height, camera.width)
     pixels = np.flatnonzero(np.ones(shape, bool) if where is None else where)
-    directions = apply(camera.c2w[:3, :3], camera.local_directions()[pixels].T)
+    directions = transform_vectors(camera.c2w[:3, :3], camera.local_directions()[pixels].T)
     hits = trace(moved.placed, camera.origin, directions)
     met = np.flatnonzero(hits.primitive >= 0)
     points = camera.origin[:, None] + hits.t[met] * directions[:, met].astype(np.float64)
@@ -74,7 +74,7 @@ def uncovered_pixels(moved: ProceduralScene, camera: Camera, before: ProceduralS
         for part in before.parts
         if part.name not in known or not np.array_equal(known[part.name].motion, part.motion)
     }
-    directions = apply(camera.c2w[:3, :3], camera.local_directions().T)
+    directions = transform_vectors(camera.c2w[:3, :3], camera.local_directions().T)
     first, now = (trace(scene.placed, camera.origin, directions).primitive for scene in (before, moved))
     # the last name is that of no surface, whose index is -1
     names = np.array([item.part.name for item in before.placed] + [""])[first]

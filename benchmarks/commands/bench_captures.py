@@ -145,7 +145,7 @@ class BenchCaptures:
         from benchmarks.common.workbench import digest
         from cagefield.cli.poses import verified
         from cagefield.datasets import load_dataset
-        from cagefield.datasets.training_resolution import at_training_resolution
+        from cagefield.datasets.training_resolution import shrink_to_training_resolution
         from cagefield.procedural import is_capture, make_capture
 
         path = Path(name)
@@ -165,7 +165,7 @@ class BenchCaptures:
         if self.perturb_poses:
             dataset = perturbed(dataset, self.seed)
         if self.downscale is None:
-            dataset = at_training_resolution(dataset, self.minutes)
+            dataset = shrink_to_training_resolution(dataset, self.minutes)
         found = verified(dataset, correct=not self.keep_poses, stream=sys.stderr)
         dataset = found.dataset
         if not dataset.test:

@@ -123,7 +123,7 @@ class Workbench:
     def taught(self, case: Case) -> Scene:
         """A scene trained on photos of the truth of a discrete case: what its edit could know at best."""
         what, key = f"{case.scene}, {case.name}", digest([*self._shape, case.name], _TRULY_MOVED)
-        truth = _models(case)[1].with_its_own_occlusion()
+        truth = _models(case)[1].with_new_occlusion()
         dataset = self._photographed(case.scene, truth, f"{what}: photos to teach by", key)
         return self._trained(what, dataset)
 
@@ -184,7 +184,7 @@ class Workbench:
         With `old_shadows` ambient occlusion stays as modelled: on what the part left, and on the part.
         """
         _, scene = _models(case)
-        scene = scene if old_shadows else scene.with_its_own_occlusion()
+        scene = scene if old_shadows else scene.with_new_occlusion()
         key = digest([case.scene, case.name, old_shadows, _poses(cameras)], _TRULY_MOVED)
         what = f"{case.scene}, {case.name}: photos of the truth"
         return self._kept(case.scene, key, what, lambda: self._photographs(scene, cameras), len(cameras))
@@ -210,7 +210,7 @@ class Workbench:
         what = f"{case.scene}, {case.name}: what was uncovered"
         return self._kept(case.scene, key, what, lambda: masks, len(cameras)).astype(bool)
 
-    def modelled(self, name: str, cameras: Sequence[Camera]) -> UInt8:
+    def modeled(self, name: str, cameras: Sequence[Camera]) -> UInt8:
         """Photos [V,H,W,3] of a built-in scene as it is, over white."""
         scene = procedural_scene(name)
         key = digest([name, _poses(cameras)], _MODELLED)
@@ -221,7 +221,7 @@ class Workbench:
     def mapped(self, name: str, edits: EditStack | None, cameras: Sequence[Camera]) -> UInt8:
         """Photos [V,H,W,3] of a built-in scene seen through the exact map of edits, over white."""
         if edits is None:
-            return self.modelled(name, cameras)
+            return self.modeled(name, cameras)
         stack = EditStack(edit.replace(lattice=None) for edit in edits)
         key = digest([name, dump_edits(stack), _poses(cameras)], (*_MODELLED, *_MAPPED))
         scene = MappedScene(procedural_scene(name), exact(stack))

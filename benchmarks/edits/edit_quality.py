@@ -20,7 +20,7 @@ from benchmarks.edits.naive_splats import seen_naively
 from cagefield.cameras.camera import Camera
 from cagefield.fields.splat_field import SplatField
 from cagefield.images.image_files import side_by_side, write_png
-from cagefield.procedural.writer import FOV_X
+from cagefield.procedural.writer import FOV_X_RAD
 from cagefield.scene.scene import Scene
 from cagefield.typing import AnyArray
 
@@ -60,7 +60,7 @@ def measure(cases: Sequence[Case], bench: Workbench, *, taught: bool = False) ->
             after, rays = bench.mapped(name, case.edits, cameras), FINER
         else:
             cameras = cameras[: bench.settings.discrete_views]
-            truth, before = "photos", bench.modelled(name, cameras)
+            truth, before = "photos", bench.modeled(name, cameras)
             after, rays = bench.moved(case, cameras), 1
         if truth not in unedited:
             unedited[truth] = seen(scene, cameras, rays)
@@ -99,7 +99,7 @@ def _revealed(
     taught: bool,
 ) -> Revealed:
     """The figures of a discrete case on what its edit brings to light, from pictures of the field."""
-    before, after = bench.modelled(case.scene, cameras), bench.moved(case, cameras)
+    before, after = bench.modeled(case.scene, cameras), bench.moved(case, cameras)
     left = bench.moved(case, cameras, old_shadows=True)
     uncovered = bench.uncovered_pixels(case, cameras)
     unseen = bench.unseen_pixels(case, cameras, changed_pixels(before, after))
@@ -134,7 +134,7 @@ def frame_ratio(scene: Scene, edited: Scene) -> float:
 
 def eye(scene: str, size: int) -> Camera:
     """The camera of a scene's pictures, size x size pixels."""
-    return Camera.look_at(_EYES[scene], (0, 0, 0), width=size, height=size, fov_x=FOV_X)
+    return Camera.look_at(_EYES[scene], (0, 0, 0), width=size, height=size, fov_x=FOV_X_RAD)
 
 
 def picture_path(folder: Path, case: Case) -> Path:

@@ -117,14 +117,14 @@ def _shots(case: Case, bench: Workbench, front: Camera, cameras: Sequence[Camera
     moved = model if case.moved is None else case.moved(model)
     center, extent = model.part_box(model.part_names, 0.05)
     turn = Edit(Cage.box(center, extent), adjustment="discrete").rotate((0.0, 0.0, np.pi))
-    turned = model.move(model.part_names, rotate=(0.0, 0.0, np.pi), pivot=center).carrying_light()
+    turned = model.move(model.part_names, rotate=(0.0, 0.0, np.pi), pivot=center).with_modeled_light()
     alone = EditStack(edit.replace(fill="none", relight="none") for edit in case.edits)
     turn = turn.replace(fill="none", relight="none")
     one_side = bench.one_sided(case.scene, front, REACH)
     return _Shots(
         edited=seen(scene.with_edits(alone), cameras),
         old_shadows=photos(moved, cameras),
-        new_shadows=photos(moved.with_its_own_occlusion(), cameras),
+        new_shadows=photos(moved.with_new_occlusion(), cameras),
         one_side=seen(one_side, cameras),
         one_side_turned=seen(one_side.with_edits(EditStack([turn])), cameras),
         all_round_turned=seen(scene.with_edits(EditStack([turn])), cameras),

@@ -25,7 +25,7 @@ from cagefield.images.render_result import Background, RenderResult
 from cagefield.procedural import ProceduralScene
 from cagefield.procedural.distance_cells import DistanceCells
 from cagefield.procedural.supersampling import photograph
-from cagefield.procedural.tracing import TOLERANCE, Hits, along, trace
+from cagefield.procedural.tracing import HIT_TOLERANCE, Hits, points_along_rays, trace
 from cagefield.rendering.reference_renderer import intersect_box
 from cagefield.typing import Array, Float32, Int, Mask
 
@@ -65,7 +65,7 @@ class _Samples:
     @property
     def arrived(self) -> Mask:
         """Whether the surface is as near as `trace` asks for, or the sample inside."""
-        near: Mask = (self.bound < np.float32(TOLERANCE) * self.stretch) & (self.primitive >= 0)
+        near: Mask = (self.bound < np.float32(HIT_TOLERANCE) * self.stretch) & (self.primitive >= 0)
         return near
 
     def put(self, rows: Int, other: _Samples) -> None:
@@ -119,15 +119,15 @@ class MappedScene:
         rows = np.flatnonzero((enter < leave) & (hits.t >= enter))
         beyond = trace(self.scene.placed, origin, directions[:, rows], leave[rows])
         hits.t[rows], hits.primitive[rows], hits.instance[rows] = beyond.t, beyond.primitive, beyond.instance
-        points = along(origin, directions[:, rows], beyond.t)
-        rgb[rows], normals[rows] = self.scene.colours(beyond, points, directions[:, rows])
+        points = points_along_rays(origin, directions[:, rows], beyond.t)
+        rgb[rows], normals[rows] = self.scene.colors(beyond, points, directions[:, rows])
         for first in range(0, len(rows), _CHUNK):
             part = rows[first : first + _CHUNK]
             met, t, found = self._march(start, directions[:, part], enter[part], leave[part])
             part = part[met]
             own = Hits(t, found.primitive, found.instance)
             hits.t[part], hits.primitive[part], hits.instance[part] = own.t, own.primitive, own.instance
-            rgb[part], normals[part] = self.scene.colours(own, found.points, found.viewdirs)
+            rgb[part], normals[part] = self.scene.colors(own, found.points, found.viewdirs)
         return rgb, normals, hits
 
     @cached_property

@@ -26,7 +26,7 @@ from cagefield.errors import CagefieldError
 from cagefield.images.image_files import side_by_side, write_png
 from cagefield.images.metrics import color_fit
 from cagefield.procedural import capture
-from cagefield.procedural.hand_held import picture
+from cagefield.procedural.hand_held import render_image
 from cagefield.typing import Float32
 
 _ROUNDS = 5
@@ -51,8 +51,8 @@ def measure(dataset: Dataset, learnt: Learnt, cases: Sequence[Case]) -> list[Roo
     scores = []
     for case in cases:
         scene, edited = capture(case.scene).scene, learnt.edited(case.edits)
-        truth = np.stack([_clipped(picture(scene, camera)[0]) for camera in cameras])
-        moved = np.stack([_clipped(picture(_moved(case), camera)[0]) for camera in cameras])
+        truth = np.stack([_clipped(render_image(scene, camera)[0]) for camera in cameras])
+        moved = np.stack([_clipped(render_image(_moved(case), camera)[0]) for camera in cameras])
         plain = [_clipped(learnt.show(camera).rgb) for camera in cameras]
         fits = [color_fit(shown, true) for shown, true in zip(plain, truth, strict=True)]
         after = [fit(_clipped(edited(camera).rgb)) for camera, fit in zip(cameras, fits, strict=True)]
@@ -128,8 +128,8 @@ def write_picture(learnt: Learnt, case: Case, folder: Path, size: int = 480) -> 
     eye, target = _EYES[case.scene]
     camera = Camera.look_at(eye, target, width=round(0.75 * size), height=size, fov_x=float(np.radians(52.0)))
     before, after = (_clipped(show(camera).rgb) for show in (learnt.show, learnt.edited(case.edits)))
-    fit = color_fit(before, _clipped(picture(capture(case.scene).scene, camera)[0]))
-    truth = _clipped(picture(moved, camera)[0])
+    fit = color_fit(before, _clipped(render_image(capture(case.scene).scene, camera)[0]))
+    truth = _clipped(render_image(moved, camera)[0])
     path = folder / case.file.replace(".yaml", ".png")
     write_png(path, side_by_side(fit(before), fit(after), truth))
     return path

@@ -13,7 +13,7 @@ from reader_seeds import Read, Reader
 
 from cagefield.datasets import load_dataset
 from cagefield.datasets.photos import read_photo
-from cagefield.datasets.raw_photos import upright
+from cagefield.datasets.raw_photos import write_upright
 from cagefield.datasets.sfm.raw_masks import RawMasks
 from cagefield.datasets.transforms.point_files import read_points
 from cagefield.images.image_files import read_image
@@ -260,10 +260,10 @@ def _make_raw_masks(folder: Path) -> None:
 def _read_raw_masks(folder: Path) -> None:
     photos = folder / "photos"
     names = [f"{n}.jpg" for n in range(3)]
-    masks = RawMasks.of(photos, names)
+    masks = RawMasks.find(photos, names)
     masks.digest()
     for name in names:
-        photo = upright(photos / name, name, folder / "out")
+        photo = write_upright(photos / name, name, folder / "out")
         masks.write(name, photos / name, photo, folder / "valid")
 
 

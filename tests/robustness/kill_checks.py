@@ -232,14 +232,14 @@ def posed_problem(folder: Path, said: int) -> str | None:
 def poses_problem(folder: Path, said: int) -> str | None:
     """What is wrong with the data set, of which an old one was there: not whole, or the user's file gone."""
     from cagefield import datasets
-    from cagefield.datasets.colmap.colmap_files import check_whole
+    from cagefield.datasets.colmap.colmap_files import check_complete
     from cagefield.images.image_files import read_image
 
     data = folder / "data"
     if not (data / "notes.txt").is_file():
         return "lost: the user's file"
     try:
-        check_whole(data / "sparse" / "0")
+        check_complete(data / "sparse" / "0")
         views = datasets.load_dataset(data, holdout=0).train
         for view in views:
             read_image(view.image_path)

@@ -183,7 +183,7 @@ def _make_posed(folder: Path) -> None:
 def _poses(folder: Path, say: Say) -> None:
     from cagefield.datasets.sfm import matching
 
-    matching._FEW = 3  # six pairs are matched in two processes, as those of many photos are
+    matching._MIN_PAIRS_PER_PROCESS = 3  # six pairs are matched in two processes, as those of many photos are
     cli("poses", folder / "photos", "-o", folder / "data", "--overwrite")
     say(1)
 
@@ -192,13 +192,13 @@ def _poses(folder: Path, say: Say) -> None:
 def _posed_video() -> tempfile.TemporaryDirectory[str]:
     """The photos as a video, and the data set that was made of it; made once, by another process."""
     from cagefield.images.image_files import read_image
-    from cagefield.images.video import encoder
+    from cagefield.images.video import open_encoder
 
     folder = tempfile.TemporaryDirectory(prefix="cagefield-posed-video-")
     video = Path(folder.name) / "v.mp4"
     pictures = [read_image(file) for file in sorted((Path(_posed().name) / "photos").iterdir())]
     height, width = pictures[0].shape[:2]
-    with encoder(video, (width, height), 4.0, 10) as encode:
+    with open_encoder(video, (width, height), 4.0, 10) as encode:
         for picture in pictures:
             encode(picture[..., :3].tobytes())
     words = ["poses", str(video), "-o", f"{folder.name}/data", "--frames", "4"]

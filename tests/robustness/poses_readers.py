@@ -18,7 +18,7 @@ from cagefield.datasets.sfm import registration_report, sfm_workspace, sparse_po
 from cagefield.datasets.sfm.database_check import check_database, recorded_digest
 from cagefield.datasets.sfm.features import Photo
 from cagefield.errors import CagefieldError
-from cagefield.images.video import encoder, is_ours
+from cagefield.images.video import is_cagefield_video, open_encoder
 from posed_photos import photos_alone
 
 
@@ -37,18 +37,18 @@ def _make_photos(count: int, folder: Path) -> None:
     for n in range(4, count):
         shutil.copy(photos / "00.png", photos / f"{n:02}.png")
     (folder / "work").mkdir()
-    sfm_workspace.work_photos(photos, folder / "work", 3, _no_progress)
+    sfm_workspace.prepare_photos(photos, folder / "work", 3, _no_progress)
 
 
 def _read_photos(folder: Path) -> None:
     """The list, copies for COLMAP, and its guesses of cameras."""
     work = folder / "work"
-    known = sfm_workspace._known_photos(work / "photos.json", work / "images")
+    known = sfm_workspace._read_photo_list(work / "photos.json", work / "images")
     if known is None:
         raise CagefieldError("it is damaged, and the photos are read again")
     shutil.rmtree(work / "colmap", ignore_errors=True)
-    sfm_workspace.plainly_named(known[0], work)
-    structure_from_motion.camera_guesses(known[0])
+    sfm_workspace.link_plain_names(known[0], work)
+    structure_from_motion.guess_cameras(known[0])
 
 
 def _record_reader(files: int) -> Reader:
@@ -65,12 +65,12 @@ def _make_poses(left_out: int, folder: Path) -> None:
     photos = photos_alone(folder / "photos")
     (folder / "data").mkdir()
     blurred = {f"a{n}": "blurred" for n in range(left_out)}
-    made = {"made_of": sfm_workspace.record_of(photos, 80), "photos": 4, "left_out": blurred}
+    made = {"made_of": sfm_workspace.photo_record(photos, 80), "photos": 4, "left_out": blurred}
     (folder / "data" / "poses.json").write_text(json.dumps(made))
 
 
 def _read_poses(folder: Path) -> None:
-    if not structure_from_motion.is_made_of(folder / "data", folder / "photos"):
+    if not structure_from_motion.is_built_from(folder / "data", folder / "photos"):
         raise CagefieldError("it is of other photos, or damaged")
 
 
@@ -136,24 +136,24 @@ def _read_database(folder: Path) -> None:
         check_database(database)
     if not database.exists():
         raise CagefieldError("it is damaged, and the features are found again")
-    features.likely_pairs(database, 3)
+    features.select_likely_pairs(database, 3)
     registration_report.verified_matches(database, 3)
 
 
 def _make_video(folder: Path) -> None:
     chance = np.random.default_rng(0)
-    with encoder(folder / "v.mp4", (32, 24), 10.0, 30) as encode:
+    with open_encoder(folder / "v.mp4", (32, 24), 10.0, 30) as encode:
         for _ in range(6):
             encode(chance.integers(0, 256, (24, 32, 3)).astype(np.uint8).tobytes())
 
 
 def _read_video(folder: Path) -> None:
     shutil.rmtree(folder / "frames", ignore_errors=True)
-    raw_photos.video_frames(folder / "v.mp4", 3, folder / "frames")
+    raw_photos.extract_video_frames(folder / "v.mp4", 3, folder / "frames")
 
 
 def _read_replaced_video(folder: Path) -> None:
-    if not is_ours(folder / "v.mp4"):
+    if not is_cagefield_video(folder / "v.mp4"):
         raise CagefieldError("it is none of ours, and stays")
 
 

@@ -13,7 +13,7 @@ from reader_seeds import Reader
 import program_folders as write
 from cagefield.datasets import load_dataset
 from cagefield.datasets.photos import read_photo
-from cagefield.datasets.raw_photos import upright
+from cagefield.datasets.raw_photos import write_upright
 from cagefield.images.image_files import read_image
 from heic_photos import TURNED_HEIC
 from icc_profiles import DISPLAY_P3, matrix_profile
@@ -62,7 +62,7 @@ def _read_photo(name: str) -> Callable[[Path], None]:
     def read(folder: Path) -> None:
         read_photo(folder / name, 2)
         read_image(folder / name)
-        upright(folder / name, name, folder / "out")
+        write_upright(folder / name, name, folder / "out")
 
     return read
 

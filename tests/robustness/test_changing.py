@@ -106,7 +106,7 @@ def cut_off(*args):
     walk(*args)
 colmap_files._walk = cut_off
 try:
-    colmap_files.check_whole(file.parent)
+    colmap_files.check_complete(file.parent)
 except DatasetError as error:
     print(error)
 """

@@ -190,7 +190,7 @@ def test_poses_that_a_training_used_come_back(
     monkeypatch.setattr(dataset_loader, "has_photos_alone", lambda photos: True)
     monkeypatch.setattr(
         structure_from_motion,
-        "is_made_of",
+        "is_built_from",
         lambda target, photos, masks=None: (target / "poses.json").is_file(),
     )
     made_poses(tmp_path)

@@ -1,4 +1,4 @@
-"""Cameras: OpenGL axes (+x right, +y up, looks along -z); column i, row j has its centre at (i+.5, j+.5).
+"""Cameras: OpenGL axes (+x right, +y up, looks along -z); column i, row j has its center at (i+.5, j+.5).
 
 A camera is a pose `c2w`, an image size, intrinsics in pixels and a lens model (see
 `cagefield.cameras.lenses`).
@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cagefield.cameras import lenses
-from cagefield.cameras.camera_checks import checked_number, checked_pose, checked_size
+from cagefield.cameras.camera_checks import validate_number, validate_pose, validate_size
 from cagefield.cameras.lenses import Lens
 from cagefield.errors import CameraError
 
@@ -27,12 +27,12 @@ Float32Array = npt.NDArray[np.float32]
 _MAX_BLIND_SHARE = (
     0.1  # above this share of pixels without a ray, coefficients and image do not belong together
 )
-_FLIP = np.array([1.0, -1.0, -1.0])  # OpenGL camera axes <-> OpenCV camera axes
+_OPENGL_TO_OPENCV = np.array([1.0, -1.0, -1.0])  # OpenGL camera axes <-> OpenCV camera axes
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """One camera: pose [4,4] float64, image size and intrinsics in pixels, lens model and its coefficients.
+    """Camera: pose [4,4] float64, image size and intrinsics in pixels, lens model and its coefficients.
 
     `model` "pinhole" has no `distortion`; "opencv" has k1, k2, p1, p2 and optionally k3, k4 (radial, not the
     rational model's denominators); "opencv_fisheye" has k1..k4.
@@ -54,11 +54,11 @@ class Camera:
         def set_field(name: str, value: object) -> None:
             object.__setattr__(self, name, value)
 
-        set_field("c2w", checked_pose(self.c2w))
+        set_field("c2w", validate_pose(self.c2w))
         for name in ("width", "height"):
-            set_field(name, checked_size(name, getattr(self, name)))
+            set_field(name, validate_size(name, getattr(self, name)))
         for name in ("fx", "fy", "cx", "cy"):
-            value = checked_number(name, getattr(self, name))
+            value = validate_number(name, getattr(self, name))
             if name in ("fx", "fy") and value <= 0:
                 raise CameraError(f"{name} must be a positive focal length in pixels, got {value}")
             set_field(name, value)
@@ -71,16 +71,16 @@ class Camera:
                 f"a camera of model {self.model!r} takes {counts} distortion coefficients, "
                 f"got {len(self.distortion)}"
             )
-        set_field("distortion", tuple(checked_number("distortion", k) for k in self.distortion))
+        set_field("distortion", tuple(validate_number("distortion", k) for k in self.distortion))
 
     @classmethod
     def from_fov(cls, c2w: npt.ArrayLike, width: int, height: int, fov_x: float) -> Camera:
-        """A pinhole camera with square pixels and a central axis; `fov_x` is horizontal, in radians."""
+        """Pinhole camera with square pixels and a central axis; `fov_x` is horizontal, in radians."""
         if not 0.0 < fov_x < math.pi:
             raise CameraError(
                 f"fov_x must lie between 0 and pi radians, got {fov_x}; convert degrees with math.radians"
             )
-        focal = 0.5 * checked_size("width", width) / math.tan(0.5 * fov_x)
+        focal = 0.5 * validate_size("width", width) / math.tan(0.5 * fov_x)
         return cls(cast(FloatArray, c2w), width, height, focal, focal, 0.5 * width, 0.5 * height)
 
     @classmethod
@@ -94,7 +94,7 @@ class Camera:
         height: int,
         fov_x: float,
     ) -> Camera:
-        """A pinhole camera at `eye` [3] that looks at `target` [3], with `up` [3] upwards in the image.
+        """Pinhole camera at `eye` [3] that looks at `target` [3], with `up` [3] upwards in the image.
 
         Raises CameraError where eye and target coincide or `up` is parallel to the direction of view.
         """
@@ -123,11 +123,11 @@ class Camera:
 
     @property
     def forward(self) -> FloatArray:
-        """Unit world direction [3] in which the camera looks."""
+        """Unit world direction [3] of view."""
         return -self.c2w[:3, 2] / np.linalg.norm(self.c2w[:3, 2])
 
     def local_directions(self) -> Float32Array:
-        """Unit camera-space directions [height*width,3] float32 of the pixel centres; read-only, cached.
+        """Unit camera-space directions [height*width,3] float32 of the pixel centers; read-only, cached.
 
         Row j*width+i belongs to pixel (i,j). Lens distortion is undone to rounding. A pixel outside the field
         of the lens (beyond the fold of its polynomial) gets the nearest direction inside, with one warning.
@@ -137,7 +137,7 @@ class Camera:
         return _local_directions(*self._intrinsics())
 
     def rays(self, pixels: npt.ArrayLike | None = None) -> tuple[Float32Array, Float32Array]:
-        """World-space ray origins [N,3] and unit directions [N,3], float32, through pixel centres.
+        """World-space ray origins [N,3] and unit directions [N,3], float32, through pixel centers.
 
         `pixels` [N,2] holds integer (column i, row j); None means all of them, row by row.
 
@@ -175,20 +175,22 @@ class Camera:
         world = np.asarray(points, dtype=np.float64)
         if world.ndim != 2 or world.shape[1] != 3:
             raise CameraError(f"points must have the shape [N,3], got {list(world.shape)}")
-        local = (world - self.origin) @ np.linalg.inv(self.c2w[:3, :3]).T * _FLIP
+        local = (world - self.origin) @ np.linalg.inv(self.c2w[:3, :3]).T * _OPENGL_TO_OPENCV
         image = lenses.project(local, self.model, self.distortion)
         return image * (self.fx, self.fy) + (self.cx, self.cy), local[:, 2]
 
     def resized(self, width: int, height: int) -> Camera:
-        """The same view in an image of `width` x `height`: intrinsics in pixels scale with each side."""
-        sx, sy = checked_size("width", width) / self.width, checked_size("height", height) / self.height
+        """Camera of an image of `width` x `height` with the same field of view: intrinsics scale with each
+        side.
+        """
+        sx, sy = validate_size("width", width) / self.width, validate_size("height", height) / self.height
         return replace(
             self, width=width, height=height,
             fx=self.fx * sx, fy=self.fy * sy, cx=self.cx * sx, cy=self.cy * sy,
         )  # fmt: skip
 
     def downscaled(self, factor: int) -> Camera:
-        """The camera of an image whose pixels are boxes of `factor` x `factor` of this one's.
+        """Camera of an image whose pixels are blocks of `factor` x `factor` pixels.
 
         Intrinsics are divided by exactly `factor`; left-over columns and rows (right, bottom) are dropped.
         """
@@ -205,11 +207,11 @@ class Camera:
         )  # fmt: skip
 
     def with_c2w(self, c2w: npt.ArrayLike) -> Camera:
-        """The same camera in another pose."""
+        """Camera in another pose."""
         return replace(self, c2w=cast(FloatArray, c2w))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers and lists for a JSON file; `from_dict` gives the same camera back, bit for bit."""
+        """Plain numbers and lists for a JSON file; `from_dict` restores an equal camera, bit for bit."""
         return {
             "c2w": self.c2w.tolist(), "width": self.width, "height": self.height,
             "fx": self.fx, "fy": self.fy, "cx": self.cx, "cy": self.cy,
@@ -218,7 +220,7 @@ class Camera:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Camera:
-        """The camera that `to_dict` described. Raises CameraError for keys that are missing or unknown."""
+        """Camera of the values from `to_dict`. Raises CameraError for keys that are missing or unknown."""
         required = ("c2w", "width", "height", "fx", "fy", "cx", "cy")
         known = (*required, "model", "distortion")
         for key in values:
@@ -274,14 +276,14 @@ def turntable(
     front = front - (front @ axis) * axis
     front = front / np.linalg.norm(front)
     side = np.cross(axis, front)
-    middle = np.asarray(center, dtype=np.float64).reshape(3)
+    target = np.asarray(center, dtype=np.float64).reshape(3)
     azimuths = 2.0 * math.pi * np.arange(n) / n
     return tuple(
         Camera.look_at(
-            middle
+            target
             + radius * math.cos(elevation) * (math.cos(a) * front + math.sin(a) * side)
             + radius * math.sin(elevation) * axis,
-            middle,
+            target,
             axis,
             width=width,
             height=height,
@@ -295,9 +297,11 @@ def _unproject_pixels(
     positions: npt.NDArray[Any],
     fx: float, fy: float, cx: float, cy: float, model: Lens, distortion: tuple[float, ...],
 ) -> tuple[Float32Array, npt.NDArray[np.bool_]]:  # fmt: skip
-    """Unit OpenGL camera-space directions [N,3] of pixel positions [N,2], and which of them the lens sees."""
-    directions, seen = lenses.unproject((positions - (cx, cy)) / (fx, fy), model, distortion)
-    return (directions * _FLIP).astype(np.float32), seen
+    """(unit OpenGL camera-space directions [N,3] of pixel positions [N,2], mask [N] of those within the
+    lens's field).
+    """
+    directions, is_visible = lenses.unproject((positions - (cx, cy)) / (fx, fy), model, distortion)
+    return (directions * _OPENGL_TO_OPENCV).astype(np.float32), is_visible
 
 
 @lru_cache(maxsize=16)
@@ -307,14 +311,15 @@ def _local_directions(
 ) -> Float32Array:  # fmt: skip
     columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     positions = np.stack([columns.ravel(), rows.ravel()], axis=1)
-    directions, seen = _unproject_pixels(positions, fx, fy, cx, cy, model, distortion)
-    blind = int(np.count_nonzero(~seen))
-    if blind:
+    directions, is_visible = _unproject_pixels(positions, fx, fy, cx, cy, model, distortion)
+    blind_count = int(np.count_nonzero(~is_visible))
+    if blind_count:
         message = (
-            f"{blind} of {width * height} pixels lie outside the field of the lens: model {model!r} with "
+            f"{blind_count} of {width * height} pixels lie outside the field of the lens: model "
+            f"{model!r} with "
             f"distortion {distortion} folds inside the image of {width}x{height}"
         )
-        if blind > _MAX_BLIND_SHARE * width * height:
+        if blind_count > _MAX_BLIND_SHARE * width * height:
             raise CameraError(
                 f"{message}; check that focal length, image size and coefficients belong together, "
                 "or undistort the photos first"

@@ -1,4 +1,4 @@
-"""What numbers and poses a camera takes, and the errors that say what is wrong with others."""
+"""Validation of the numbers and poses of a camera, with errors that name the fault and the cure."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from cagefield.typing import Array
 RIGID_TOLERANCE = 5e-3  # rotations printed with three decimals stay under it; a scale of 0.5 % does not
 
 
-def checked_pose(c2w: npt.ArrayLike) -> Array:
-    """A read-only [4,4] float64 copy of a rigid camera-to-world matrix."""
+def validate_pose(c2w: npt.ArrayLike) -> Array:
+    """Read-only [4,4] float64 copy of a rigid camera-to-world matrix. Raises CameraError for any other
+    matrix.
+    """
     try:
         pose = np.array(c2w, dtype=np.float64)
     except (TypeError, ValueError):
@@ -42,16 +44,16 @@ def checked_pose(c2w: npt.ArrayLike) -> Array:
     return pose
 
 
-def checked_size(name: str, value: Any) -> int:
-    """A whole number of pixels, at least 1, or a `CameraError` that names it."""
-    number = checked_number(name, value)
+def validate_size(name: str, value: Any) -> int:
+    """Whole number of pixels, at least 1. Raises CameraError, which names it."""
+    number = validate_number(name, value)
     if number != int(number) or number < 1:
         raise CameraError(f"{name} must be a whole number of pixels, at least 1, got {value!r}")
     return int(number)
 
 
-def checked_number(name: str, value: Any) -> float:
-    """A finite number, or a `CameraError` that names it."""
+def validate_number(name: str, value: Any) -> float:
+    """Finite number. Raises CameraError, which names it."""
     is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
     if not is_number or not math.isfinite(value):
         raise CameraError(f"{name} must be a finite number, got {value!r}")

@@ -1,6 +1,6 @@
 """Camera paths: nerfstudio camera-path files, and an orbit that suits the cameras of a capture.
 
-Camera-to-world matrices are OpenGL [4,4] as everywhere (camera looks along -z, +y up); angles are radians.
+Camera-to-world matrices are OpenGL [4,4] (camera looks along -z, +y up); angles are radians.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from cagefield.files.safe_open import read_text
 
 Floats = npt.NDArray[np.float64]
 
-LEAST_FPS, MOST_FPS = 0.001, 1000.0
-"""Pictures a second of a video: its encoder refuses others, once all of them are drawn."""
+MIN_FPS, MAX_FPS = 0.001, 1000.0
+"""Least and largest frame rate of a video: the video encoder refuses other rates."""
 
-_SWING = 0.8
-"""Share of the covered arc that a swing uses: the outermost cameras see less that others see too."""
+_SWING_ARC_SHARE = 0.8
+"""Share of the covered arc that a swing uses: few cameras see the regions near its ends."""
 
 
 @dataclass(frozen=True)
 class CameraPath:
-    """Cameras to be shown one after the other, `fps` of them a second."""
+    """Cameras in order of time, `fps` of them a second."""
 
     cameras: tuple[Camera, ...]
     fps: float
 
 
 def load_camera_path(path: Path | str, dataparser_transforms: Path | str | None = None) -> CameraPath:
-    """The path in a nerfstudio camera-path file.
+    """Camera path of a nerfstudio camera-path file.
 
     Its keys: `camera_path` (`camera_to_world`, `fov`), `render_width`, `render_height`, `fps`, `seconds`.
     `fov` is vertical and in degrees; pixels are square, so `aspect` follows from the size and is not read.
@@ -70,12 +70,13 @@ def load_camera_path(path: Path | str, dataparser_transforms: Path | str | None 
 
 
 def orbit(cameras: Sequence[Camera], n: int, *, width: int, height: int) -> tuple[Camera, ...]:
-    """`n` cameras on a closed circle around what `cameras` look at, at their mean distance and elevation.
+    """`n` cameras on a closed circle around the common target of `cameras`, at their mean distance and
+    elevation.
 
-    The centre is the point nearest to all optical axes (least squares), the axis of the circle their
-    shared up direction. Where the cameras cover less than two thirds of the circle (a capture from one side)
-    the path swings to and fro over most of the arc they cover instead, and stays where the field was seen.
-    The field of view is the first camera's, along the longer side.
+    The center is the point nearest to all optical axes (least squares), the axis of the circle their shared
+    up direction. Where the cameras cover less than two thirds of the circle (a capture from one side) the
+    path swings to and fro over most of the covered arc instead, within the observed region. The field of view
+    is the first camera's, along the longer side.
 
     Raises:
         CameraError: fewer than one camera, or `n` < 1.
@@ -90,7 +91,7 @@ def orbit(cameras: Sequence[Camera], n: int, *, width: int, height: int) -> tupl
     offsets = poses[:, :3, 3] - center
     heights = offsets @ up
     level = offsets - heights[:, None] * up
-    reach, rise = float(np.linalg.norm(level, axis=1).mean()), float(heights.mean())
+    radius, elevation_height = float(np.linalg.norm(level, axis=1).mean()), float(heights.mean())
     first = cameras[0]
     focal = max(width, height) / max(first.width, first.height) * first.fx
     fov_x = 2.0 * math.atan(0.5 * width / focal)
@@ -99,16 +100,20 @@ def orbit(cameras: Sequence[Camera], n: int, *, width: int, height: int) -> tupl
     arc = _covered_arc(np.arctan2(level @ y_axis, level @ x_axis))
     if arc is None:
         return turntable(
-            center, math.hypot(reach, rise), n, elevation=math.atan2(rise, reach), up=up,
-            width=width, height=height, fov_x=fov_x,
+            center, math.hypot(radius, elevation_height), n, elevation=math.atan2(elevation_height, radius),
+            up=up, width=width, height=height, fov_x=fov_x,
         )  # fmt: skip
-    swing = arc[0] + 0.5 * arc[1] * (1.0 - _SWING * np.cos(2.0 * math.pi * np.arange(n) / n))
-    eyes = center + rise * up + reach * (np.cos(swing)[:, None] * x_axis + np.sin(swing)[:, None] * y_axis)
+    swing = arc[0] + 0.5 * arc[1] * (1.0 - _SWING_ARC_SHARE * np.cos(2.0 * math.pi * np.arange(n) / n))
+    eyes = (
+        center
+        + elevation_height * up
+        + radius * (np.cos(swing)[:, None] * x_axis + np.sin(swing)[:, None] * y_axis)
+    )
     return tuple(Camera.look_at(eye, center, up, width=width, height=height, fov_x=fov_x) for eye in eyes)
 
 
 def _path_camera(entry: object, where: str, width: int, height: int, to_dataset: Floats) -> Camera:
-    """One perspective camera from an entry of `camera_path`, in the space of the data set."""
+    """Perspective camera of an entry of `camera_path`, in the space of the data set."""
     if not isinstance(entry, Mapping):
         raise CameraError(f'{where} must be an object with "camera_to_world" and "fov"')
     values = entry.get("camera_to_world")
@@ -136,7 +141,7 @@ def _path_camera(entry: object, where: str, width: int, height: int, to_dataset:
 
 
 def _similarity_inverse(path: Path | str | None) -> Floats:
-    """The [4,4] map from nerfstudio's training space to that of transforms.json; identity without a file."""
+    """Map [4,4] from nerfstudio's training space to the space of transforms.json; identity without a file."""
     if path is None:
         return np.eye(4)
     path = Path(path)
@@ -166,17 +171,17 @@ def _frame_rate(document: Mapping[str, object], count: int, path: Path) -> float
         if not _is_number(value) or value <= 0:
             raise CameraError(f"{path}: {key!r} is {value!r:.40}; give a number above 0")
         rate = float(value) if key == "fps" else count / float(value)
-        if not LEAST_FPS <= rate <= MOST_FPS:
+        if not MIN_FPS <= rate <= MAX_FPS:
             raise CameraError(
                 f"{path}: {key!r} is {value!r:.40}, {rate:g} pictures a second; give what makes "
-                f"{LEAST_FPS:g} to {MOST_FPS:g}"
+                f"{MIN_FPS:g} to {MAX_FPS:g}"
             )
         return rate
     return 24.0
 
 
 def shared_up(poses: Floats) -> Floats:
-    """The unit up direction of cameras with these poses [N,4,4]; exactly +z where it is within 10 degrees.
+    """Unit up direction of cameras with these poses [N,4,4]; exactly +z where it is within 10 degrees.
 
     A camera that is not rolled has its +x axis level, so up is the direction most normal to all +x axes: the
     last eigenvector of Σ x xᵀ. Cameras that all share one +x axis leave it open; then it is their mean +y.
@@ -193,7 +198,7 @@ def shared_up(poses: Floats) -> Floats:
 
 
 def _common_target(poses: Floats) -> Floats:
-    """The point nearest to all optical axes, in front of the cameras on average.
+    """Point [3] nearest to all optical axes, in front of the cameras on average.
 
     Least squares of the distances to the axes, Σ (I - f fᵀ)(p - o) = 0. Parallel axes have no such point:
     then, or where it lies behind the cameras, it is the point one capture size ahead of the mean camera.
@@ -207,8 +212,8 @@ def _common_target(poses: Floats) -> Floats:
             return target
     mean_origin, mean_forward = origins.mean(axis=0), forwards.mean(axis=0)
     ahead = 2.0 * float(np.linalg.norm(origins - mean_origin, axis=1).max()) or 1.0
-    straight: Floats = mean_origin + ahead * mean_forward / max(float(np.linalg.norm(mean_forward)), 1e-9)
-    return straight
+    target_ahead: Floats = mean_origin + ahead * mean_forward / max(float(np.linalg.norm(mean_forward)), 1e-9)
+    return target_ahead
 
 
 def _covered_arc(azimuths: Floats) -> tuple[float, float] | None:
@@ -222,21 +227,21 @@ def _covered_arc(azimuths: Floats) -> tuple[float, float] | None:
 
 
 def _perpendicular(direction: Floats) -> Floats:
-    """A unit vector at right angles to `direction`."""
+    """Unit vector [3] at right angles to `direction`."""
     seed = np.eye(3)[int(np.argmin(np.abs(direction)))]
-    across: Floats = np.cross(np.cross(direction, seed), direction)
-    return across / np.linalg.norm(across)
+    perpendicular: Floats = np.cross(np.cross(direction, seed), direction)
+    return perpendicular / np.linalg.norm(perpendicular)
 
 
-def _read_json(path: Path, what: str) -> dict[str, object]:
+def _read_json(path: Path, kind_name: str) -> dict[str, object]:
     try:
         document = json_text.loads(read_text(path))
     except OSError as error:
-        raise CameraError(f"{what} {path} cannot be read: {error.strerror}; check the path") from None
+        raise CameraError(f"{kind_name} {path} cannot be read: {error.strerror}; check the path") from None
     except ValueError as error:
-        raise CameraError(f"{what} {path} is not valid JSON: {error}") from None
+        raise CameraError(f"{kind_name} {path} is not valid JSON: {error}") from None
     if not isinstance(document, dict):
-        raise CameraError(f"{what} {path} must hold a JSON object")
+        raise CameraError(f"{kind_name} {path} must hold a JSON object")
     return document
 
 

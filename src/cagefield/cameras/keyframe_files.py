@@ -1,6 +1,6 @@
-"""Files of keyframed camera paths: nerfstudio's, keyframes included.
+"""Files of keyframed camera paths in nerfstudio's format, keyframes included.
 
-The edits' parts and a key's seconds stand in them under names that nerfstudio passes over.
+The edits' parts and a key's seconds have names of their own, which nerfstudio ignores.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from cagefield.files.safe_open import read_text
 def dump_path(
     keys: Sequence[Keyframe], *, loop: bool, fps: float = 24.0, width: int = 800, height: int = 800
 ) -> str:
-    """The text of a nerfstudio camera-path file: its keyframes, and a camera for each picture."""
-    pictures = stills(keys, loop=loop, fps=fps, width=width, height=height) if keys else ()
+    """Text of a nerfstudio camera-path file: its keyframes, and a camera for each image."""
+    images = stills(keys, loop=loop, fps=fps, width=width, height=height) if keys else ()
     aspect = width / height
     document = {
         "camera_type": "perspective",
         "render_height": height,
         "render_width": width,
         "fps": fps,
-        "seconds": len(pictures) / fps,
+        "seconds": len(images) / fps,
         "is_cycle": loop,
         "smoothness_value": 0.0,
         "default_fov": keys[0].fov_y_deg if keys else 50.0,
@@ -50,14 +50,14 @@ def dump_path(
                 "fov": still.fov_y_deg,
                 "aspect": aspect,
             }
-            for still in pictures
+            for still in images
         ],
     }
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 
 def is_path(text: str) -> bool:
-    """True for the text of a camera-path file, whole or damaged."""
+    """Whether `text` is a camera-path file, whole or damaged."""
     keys = ('"camera_path"', '"keyframes"', '"camera_type"')
     return text.lstrip().startswith("{") and '"edits"' not in text and any(key in text for key in keys)
 
@@ -80,30 +80,30 @@ def load_keys(path: Path) -> tuple[tuple[Keyframe, ...], bool]:
     if not isinstance(given, list):
         raise CameraError(f'{path}: "keyframes" must be a list; write the camera path again or remove it')
     try:
-        usual = _number(document, "default_transition_sec", 2.0)
+        default = _read_number(document, "default_transition_sec", 2.0)
         loop = document.get("is_cycle", False)
         if not isinstance(loop, bool):
-            raise CameraError(f'"is_cycle" is {_shown(loop)}; give true or false')
+            raise CameraError(f'"is_cycle" is {_shorten(loop)}; give true or false')
     except CameraError as error:
         raise CameraError(f"{path}: {error}") from None
-    return tuple(_key(given, n, usual, path) for n in range(len(given))), loop
+    return tuple(_key(given, n, default, path) for n in range(len(given))), loop
 
 
-def _key(given: list[Any], n: int, usual: float, path: Path) -> Keyframe:
-    """The key of number `n`, the time to the next one included."""
+def _key(given: list[Any], n: int, default: float, path: Path) -> Keyframe:
+    """Keyframe of number `n`, with the time to the next one."""
     try:
         entry = _mapping(given[n], 'a keyframe must have the keys "matrix" and "fov"')
         matrix = entry.get("matrix")
         if not isinstance(matrix, list) or len(matrix) != 16 or not all(map(_is_number, matrix)):
             raise CameraError('"matrix" must hold 16 numbers, the camera to the world row by row')
-        fov = _number(entry, "fov", None)
+        fov = _read_number(entry, "fov", None)
         parts = _parts(entry.get("cagefield_parts", {}))
     except CameraError as error:
         raise CameraError(f"{path}: keyframes[{n}]: {error}") from None
     after = (n + 1) % len(given)
     try:
-        own = _mapping(given[after], 'a keyframe must have the keys "matrix" and "fov"')
-        seconds = _seconds(own, usual)
+        next_entry = _mapping(given[after], 'a keyframe must have the keys "matrix" and "fov"')
+        seconds = _seconds(next_entry, default)
     except CameraError as error:
         raise CameraError(f"{path}: keyframes[{after}]: {error}") from None
     try:
@@ -112,32 +112,32 @@ def _key(given: list[Any], n: int, usual: float, path: Path) -> Keyframe:
         raise CameraError(f"{path}: keyframes[{n}]: {error}") from None
 
 
-def _seconds(key: Mapping[str, Any], usual: float) -> float:
-    """The time from the key before to this one."""
-    own = key.get("override_transition_sec")
-    if own is None or not key.get("override_transition_enabled", True):
-        return usual
-    return _number(key, "override_transition_sec", None)
+def _seconds(key: Mapping[str, Any], default: float) -> float:
+    """Seconds from the keyframe before to this one."""
+    next_entry = key.get("override_transition_sec")
+    if next_entry is None or not key.get("override_transition_enabled", True):
+        return default
+    return _read_number(key, "override_transition_sec", None)
 
 
 def _parts(given: object) -> dict[int, float]:
     cure = '"cagefield_parts" must give numbers from 0 to 1 by the numbers of edits'
     parts = _mapping(given, cure)
     if not all(name.isascii() and name.isdigit() and _is_number(part) for name, part in parts.items()):
-        raise CameraError(f"{cure}, got {_shown(given)}")
+        raise CameraError(f"{cure}, got {_shorten(given)}")
     return {int(name): float(part) for name, part in parts.items()}
 
 
 def _mapping(value: object, cure: str) -> Mapping[str, Any]:
     if not isinstance(value, dict):
-        raise CameraError(f"{cure}, got {_shown(value)}")
+        raise CameraError(f"{cure}, got {_shorten(value)}")
     return value
 
 
-def _number(values: Mapping[str, Any], name: str, usual: float | None) -> float:
-    value = values.get(name, usual)
+def _read_number(values: Mapping[str, Any], name: str, default: float | None) -> float:
+    value = values.get(name, default)
     if not _is_number(value):
-        raise CameraError(f'"{name}" must be a number, got {_shown(value)}')
+        raise CameraError(f'"{name}" must be a number, got {_shorten(value)}')
     return float(value)
 
 
@@ -145,6 +145,6 @@ def _is_number(value: object) -> TypeGuard[int | float]:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
 
 
-def _shown(value: object) -> str:
+def _shorten(value: object) -> str:
     text = "nothing" if value is None else json.dumps(value)
     return text if len(text) <= 40 else text[:37] + "..."

@@ -1,8 +1,8 @@
-"""Keyframed camera paths: cameras with a time between them, and how far each edit has gone at each.
+"""Keyframed camera paths: cameras with a time between them, and the completed part of each edit at each.
 
-Between keys the eye runs on a natural cubic spline, the direction on a rotation spline, and the field of view
-and the edits' parts on monotone cubics, which never leave the range of the keys beside them. A loop goes from
-the last key back to the first one, smoothly.
+Between keys the eye follows a natural cubic spline, the direction a rotation spline, and the field of view
+and the edits' parts monotone cubics, which never leave the range of the neighboring keys. A loop continues
+from the last key to the first one, smoothly.
 """
 
 from __future__ import annotations
@@ -23,18 +23,19 @@ from cagefield.errors import CameraError
 
 Floats = npt.NDArray[np.float64]
 
-FOV_Y_DEG = (0.2, 178.0)
+FOV_Y_RANGE_DEG = (0.2, 178.0)
 """Least and largest vertical field of view."""
 
-SECONDS = (0.01, 3600.0)
-"""Least and longest time from a key to the next."""
+SECONDS_RANGE = (0.01, 3600.0)
+"""Least and longest time from a keyframe to the next."""
 
 
 @dataclass(frozen=True)
 class Keyframe:
-    """A camera (c2w [16] row by row, vertical field of view), the seconds to the next one, the edits' parts.
+    """Camera (c2w [16] row by row, vertical field of view), seconds to the next keyframe, parts of the edits.
 
-    `parts` names edits by their number in the list from 1; those that are not named have gone all the way, 1.
+    `parts` maps the number of an edit in the list, from 1, to its completed part; an edit without a part is
+    complete, 1.
     """
 
     c2w: tuple[float, ...]
@@ -43,18 +44,20 @@ class Keyframe:
     parts: Mapping[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Raises CameraError for a pose that is not rigid, and for numbers that are out of range."""
+        """Raise CameraError for a pose that is not rigid, and for numbers out of range."""
         object.__setattr__(self, "parts", MappingProxyType(dict(self.parts)))
         if len(self.c2w) != 16 or not all(map(math.isfinite, self.c2w)):
             raise CameraError("the camera (c2w) must hold 16 finite numbers, row by row")
         Camera(self.pose, 1, 1, 1.0, 1.0, 0.5, 0.5)
-        if not FOV_Y_DEG[0] <= self.fov_y_deg <= FOV_Y_DEG[1]:
+        if not FOV_Y_RANGE_DEG[0] <= self.fov_y_deg <= FOV_Y_RANGE_DEG[1]:
             raise CameraError(
-                f"the field of view is {self.fov_y_deg:g}; give {FOV_Y_DEG[0]:g} to {FOV_Y_DEG[1]:g} degrees"
+                f"the field of view is {self.fov_y_deg:g}; give {FOV_Y_RANGE_DEG[0]:g} to "
+                f"{FOV_Y_RANGE_DEG[1]:g} degrees"
             )
-        if not SECONDS[0] <= self.seconds <= SECONDS[1]:
+        if not SECONDS_RANGE[0] <= self.seconds <= SECONDS_RANGE[1]:
             raise CameraError(
-                f"the time to the next key is {self.seconds:g} s; give {SECONDS[0]:g} to {SECONDS[1]:g}"
+                f"the time to the next key is {self.seconds:g} s; give {SECONDS_RANGE[0]:g} to "
+                f"{SECONDS_RANGE[1]:g}"
             )
         for name, part in self.parts.items():
             if name < 1:
@@ -67,13 +70,13 @@ class Keyframe:
 
     @property
     def pose(self) -> Floats:
-        """c2w [4,4]."""
+        """Matrix c2w [4,4]."""
         return np.array(self.c2w).reshape(4, 4)
 
 
 @dataclass(frozen=True)
 class Still:
-    """One picture of a path: its camera, and the part of each named edit."""
+    """Image of a path: its camera, and the completed part of each edit in `parts`."""
 
     camera: Camera
     parts: dict[int, float]
@@ -85,13 +88,14 @@ class Still:
 
 
 class Timeline:
-    """What lies between two or more keys: poses, fields of view and edits' parts by seconds from the first.
+    """Interpolation between two or more keys: poses, fields of view and edits' parts by seconds from the
+    first.
 
-    `seconds` is how long it takes, from the first key to the last, or all round with `loop`.
+    `seconds` is the duration, from the first key to the last, or all round with `loop`.
     """
 
     def __init__(self, keys: Sequence[Keyframe], *, loop: bool) -> None:
-        """Raises CameraError for fewer than two keys."""
+        """Splines through the keys. Raises CameraError for fewer than two keys."""
         if len(keys) < 2:
             raise CameraError(f"a camera path with {len(keys)} keyframes does not move; record at least two")
         ring = [*keys, keys[0]] if loop else list(keys)
@@ -99,7 +103,7 @@ class Timeline:
         self.seconds = float(times[-1])
         ends = "periodic" if loop else "natural"
         self._eyes = CubicSpline(times, [key.pose[:3, 3] for key in ring], bc_type=ends)
-        self._turns = _turns([key.pose[:3, :3] for key in ring], times, loop)
+        self._rotation_spline = _rotation_spline([key.pose[:3, :3] for key in ring], times, loop)
         self._fovs = PchipInterpolator(times, [key.fov_y_deg for key in ring])
         self._parts = {
             name: PchipInterpolator(times, [key.parts.get(name, 1.0) for key in ring])
@@ -107,9 +111,9 @@ class Timeline:
         }
 
     def poses(self, at: Floats) -> Floats:
-        """c2w [N,4,4] at times [N]."""
+        """Matrices c2w [N,4,4] at times [N]."""
         found = np.tile(np.eye(4), (len(at), 1, 1))
-        found[:, :3, :3], found[:, :3, 3] = self._turns(at).as_matrix(), self._eyes(at)
+        found[:, :3, :3], found[:, :3, 3] = self._rotation_spline(at).as_matrix(), self._eyes(at)
         return found
 
     def fovs_y_deg(self, at: Floats) -> Floats:
@@ -117,26 +121,26 @@ class Timeline:
         return np.asarray(self._fovs(at))
 
     def parts(self, at: Floats) -> dict[int, Floats]:
-        """The part [N] of each edit that a key names, at times [N]."""
+        """Part [N] at times [N] of each edit that a key has a part of."""
         return {name: np.clip(curve(at), 0.0, 1.0) for name, curve in self._parts.items()}
 
 
 def stills(keys: Sequence[Keyframe], *, loop: bool, fps: float, width: int, height: int) -> tuple[Still, ...]:
-    """The pictures of a path at `fps`, from the first key to the last, or all round with `loop`.
+    """Images of a path at `fps`, from the first key to the last, or all round with `loop`.
 
     Raises:
-        CameraError: fewer than one key, or more than 100,000 pictures.
+        CameraError: fewer than one key, or more than 100,000 images.
     """
     if not keys:
         raise CameraError("a camera path needs at least one keyframe; record one")
     if len(keys) == 1:
         return (_still(keys[0].pose, keys[0].fov_y_deg, dict(keys[0].parts), width, height),)
-    line = Timeline(keys, loop=loop)
-    count = max(2, round(line.seconds * fps) + (0 if loop else 1))
+    timeline = Timeline(keys, loop=loop)
+    count = max(2, round(timeline.seconds * fps) + (0 if loop else 1))
     if count > 100_000:
         raise CameraError(f"the camera path has {count} pictures; make it shorter or lower its fps")
-    at = np.linspace(0.0, line.seconds, count, endpoint=not loop)
-    poses, fovs, parts = line.poses(at), line.fovs_y_deg(at), line.parts(at)
+    at = np.linspace(0.0, timeline.seconds, count, endpoint=not loop)
+    poses, fovs, parts = timeline.poses(at), timeline.fovs_y_deg(at), timeline.parts(at)
     return tuple(
         _still(
             poses[n],
@@ -149,13 +153,15 @@ def stills(keys: Sequence[Keyframe], *, loop: bool, fps: float, width: int, heig
     )
 
 
-def _turns(matrices: list[Floats], times: Floats, loop: bool) -> RotationSpline:
-    """The rotation spline; a loop is gone round three times, so that its seam is as smooth as the rest."""
+def _rotation_spline(matrices: list[Floats], times: Floats, loop: bool) -> RotationSpline:
+    """Rotation spline; a loop is passed three times, so that its seam is as smooth as the rest."""
     if not loop:
         return RotationSpline(times, Rotation.from_matrix(np.stack(matrices)))
-    once, period = np.stack(matrices[:-1]), times[-1]
-    around = np.concatenate([times[:-1] - period, times[:-1], times[:-1] + period, [2.0 * period]])
-    return RotationSpline(around, Rotation.from_matrix(np.concatenate([once, once, once, once[:1]])))
+    one_turn, period = np.stack(matrices[:-1]), times[-1]
+    times_around = np.concatenate([times[:-1] - period, times[:-1], times[:-1] + period, [2.0 * period]])
+    return RotationSpline(
+        times_around, Rotation.from_matrix(np.concatenate([one_turn, one_turn, one_turn, one_turn[:1]]))
+    )
 
 
 def _still(pose: Floats, fov_y_deg: float, parts: dict[int, float], width: int, height: int) -> Still:

@@ -1,12 +1,12 @@
 """Lens models: where a direction in front of a lens lands on the image plane, and back.
 
-Notation: directions are in OpenCV camera axes (x right, y down, z forward); image points are normalised,
+Notation: directions are in OpenCV camera axes (x right, y down, z forward); image points are normalized,
 that is (pixel - c) / f. `coefficients` are the lens's distortion coefficients:
   pinhole         none: (x, y) = (X/Z, Y/Z)
   opencv          k1, k2, p1, p2 [, k3 [, k4]]: with s = x^2 + y^2, g = 1 + k1 s + k2 s^2 + k3 s^3 + k4 s^4,
                   x' = g x + 2 p1 x y + p2 (s + 2 x^2),  y' = g y + p1 (s + 2 y^2) + 2 p2 x y
   opencv_fisheye  k1, k2, k3, k4: with t the angle to the axis, the image is at the distance
-                  t' = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8) from the centre
+                  t' = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8) from the center
 A radial polynomial may stop growing at some radius (or angle): it folds there; nothing beyond has an image.
 
 Source: OpenCV `calib3d` (projectPoints, fisheye); k4 of the opencv model as in nerfstudio.
@@ -28,9 +28,9 @@ COEFFICIENTS: Final[dict[str, tuple[int, ...]]] = {
     "opencv": (4, 5, 6),
     "opencv_fisheye": (4,),
 }
-"""How many distortion coefficients each lens model takes."""
+"""Allowed numbers of distortion coefficients of each lens model."""
 
-_FLAT_LIMIT = 1e3  # largest |(X/Z, Y/Z)| of an opencv lens: 89.94 degrees off its axis
+_MAX_PLANE_RADIUS = 1e3  # largest |(X/Z, Y/Z)| of an opencv lens: 89.94 degrees off its axis
 
 
 def project(directions: Array, model: Lens, coefficients: Sequence[float] = ()) -> Array:
@@ -45,20 +45,20 @@ def project(directions: Array, model: Lens, coefficients: Sequence[float] = ()) 
         r = np.hypot(x, y)
         angle = np.arctan2(r, z)
         scale = _curve(angle, radial) / np.where(r > 0, r, 1.0)
-        seen = (angle <= polynomial_fold(radial, np.pi)) & ((r > 0) | (z > 0))
-        return np.where(seen[:, None], np.stack([x * scale, y * scale], axis=1), np.nan)
+        has_image = (angle <= polynomial_fold(radial, np.pi)) & ((r > 0) | (z > 0))
+        return np.where(has_image[:, None], np.stack([x * scale, y * scale], axis=1), np.nan)
     in_front = z > 0
     plane = np.stack([x, y], axis=1) / np.where(in_front, z, 1.0)[:, None]
     if model == "opencv":
         in_front &= np.hypot(*plane.T) <= polynomial_fold(
-            radial_coefficients(model, coefficients), _FLAT_LIMIT
+            radial_coefficients(model, coefficients), _MAX_PLANE_RADIUS
         )
         plane = distort(plane, coefficients)
     return np.where(in_front[:, None], plane, np.nan)
 
 
 def unproject(image: Array, model: Lens, coefficients: Sequence[float] = ()) -> tuple[Array, Mask]:
-    """Unit camera-space directions [N,3] seen at normalised image points `image` [N,2], and a mask [N].
+    """Unit camera-space directions [N,3] seen at normalized image points `image` [N,2], and a mask [N].
 
     The inverse of `project`, to rounding. An image point that no direction reaches (outside the fold) gets
     the nearest direction that the lens does see, and False in the mask.
@@ -66,21 +66,23 @@ def unproject(image: Array, model: Lens, coefficients: Sequence[float] = ()) -> 
     radius = np.hypot(*image.T)
     safe = np.where(radius > 0, radius, 1.0)
     if model == "opencv_fisheye":
-        angle, reached = _invert_curve(radius, radial_coefficients(model, coefficients), np.pi)
+        angle, is_reached = _invert_curve(radius, radial_coefficients(model, coefficients), np.pi)
         sine = np.sin(angle) / safe
-        return np.stack([image[:, 0] * sine, image[:, 1] * sine, np.cos(angle)], axis=1), reached
-    plane, reached = image, np.ones(len(image), dtype=bool)
+        return np.stack([image[:, 0] * sine, image[:, 1] * sine, np.cos(angle)], axis=1), is_reached
+    plane, is_reached = image, np.ones(len(image), dtype=bool)
     if model == "opencv":
-        undistorted, reached = _invert_curve(radius, radial_coefficients(model, coefficients), _FLAT_LIMIT)
+        undistorted, is_reached = _invert_curve(
+            radius, radial_coefficients(model, coefficients), _MAX_PLANE_RADIUS
+        )
         plane = image * (undistorted / safe)[:, None]
         if coefficients[2] or coefficients[3]:
-            plane, reached = _undistort(image, plane, reached, coefficients)
+            plane, is_reached = _undistort(image, plane, is_reached, coefficients)
     directions = np.concatenate([plane, np.ones((len(plane), 1))], axis=1)
-    return directions / np.linalg.norm(directions, axis=1, keepdims=True), reached
+    return directions / np.linalg.norm(directions, axis=1, keepdims=True), is_reached
 
 
 def radial_coefficients(model: Lens, coefficients: Sequence[float]) -> Array:
-    """The four radial coefficients k1..k4 of `model`."""
+    """Radial coefficients k1..k4 [4] of `model`."""
     if model == "opencv_fisheye":
         return np.array(coefficients, dtype=np.float64)
     k1, k2, _, _, k3, k4 = (*coefficients, 0.0, 0.0)[:6]
@@ -88,7 +90,7 @@ def radial_coefficients(model: Lens, coefficients: Sequence[float]) -> Array:
 
 
 def _curve(r: Array, k: Array) -> Array:
-    """r (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8)."""
+    """Distorted radius r (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8)."""
     s = r * r
     return np.asarray(r * (1.0 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])))))
 
@@ -100,17 +102,17 @@ def _curve_slope(r: Array, k: Array) -> Array:
 
 
 def fold_radius(model: Lens, coefficients: Sequence[float] = ()) -> float:
-    """The largest |(X/Z, Y/Z)| that has an image: where the distortion folds, or a lens's own limit."""
+    """Largest |(X/Z, Y/Z)| that has an image: where the distortion folds, or a lens's own limit."""
     if model == "pinhole":
         return float("inf")
     if model == "opencv_fisheye":
         fold = polynomial_fold(radial_coefficients(model, coefficients), np.pi)
-        return float(np.tan(min(fold, np.arctan(_FLAT_LIMIT))))
-    return polynomial_fold(radial_coefficients(model, coefficients), _FLAT_LIMIT)
+        return float(np.tan(min(fold, np.arctan(_MAX_PLANE_RADIUS))))
+    return polynomial_fold(radial_coefficients(model, coefficients), _MAX_PLANE_RADIUS)
 
 
 def polynomial_fold(k: Array, limit: float) -> float:
-    """The radius up to which `_curve` grows: its first stationary point, at most `limit`."""
+    """Radius up to which `_curve` grows: its first stationary point, at most `limit`."""
     slope = np.array([1.0, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]])  # in powers of r^2
     slope[np.abs(slope) * float(limit) ** (2 * np.arange(5)) < 1e-9] = 0.0
     roots = np.roots(slope[::-1])
@@ -119,13 +121,13 @@ def polynomial_fold(k: Array, limit: float) -> float:
 
 
 def _invert_curve(target: Array, k: Array, limit: float) -> tuple[Array, Mask]:
-    """The r in [0, fold] with `_curve`(r) = target, by Newton's method kept inside a shrinking bracket.
+    """(r in [0, fold] with `_curve`(r) = target, mask of the reached targets), by bracketed Newton's method.
 
-    Returns r and whether the target is reached at all; where it is not, r is the fold.
+    Where the target is not reached, r is the fold.
     """
     fold = polynomial_fold(k, limit)
     top = float(_curve(np.array([fold]), k)[0])
-    reached = target <= top
+    is_reached = target <= top
     target = np.minimum(target, top)
     low, high = np.zeros_like(target), np.full_like(target, fold)
     r = np.minimum(target, high)
@@ -138,14 +140,14 @@ def _invert_curve(target: Array, k: Array, limit: float) -> tuple[Array, Mask]:
         low, high = np.where(error <= 0, r, low), np.where(error >= 0, r, high)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             newton = r - error / _curve_slope(r, k)
-        good = (newton >= low) & (newton <= high) & (np.abs(error) <= 0.5 * before)
-        r = np.where(done, r, np.where(good, newton, 0.5 * (low + high)))
-        before = np.where(good, np.abs(error), np.inf)
-    return r, reached
+        is_newton = (newton >= low) & (newton <= high) & (np.abs(error) <= 0.5 * before)
+        r = np.where(done, r, np.where(is_newton, newton, 0.5 * (low + high)))
+        before = np.where(is_newton, np.abs(error), np.inf)
+    return r, is_reached
 
 
 def distort(plane: Array, coefficients: Sequence[float]) -> Array:
-    """The opencv model's image points of undistorted points `plane` [N,2]."""
+    """Image points [N,2] by the opencv model of undistorted points `plane` [N,2]."""
     x, y = plane.T
     p1, p2 = coefficients[2], coefficients[3]
     s = x * x + y * y
@@ -173,8 +175,10 @@ def distort_jacobian(plane: Array, coefficients: Sequence[float]) -> tuple[Array
 def _undistort(
     image: Array, start: Array, start_reached: Mask, coefficients: Sequence[float]
 ) -> tuple[Array, Mask]:
-    """The points whose opencv image is `image` [N,2], by damped Newton from `start`, and which were found."""
-    fold = polynomial_fold(radial_coefficients("opencv", coefficients), _FLAT_LIMIT)
+    """(points [N,2] whose opencv image is `image` [N,2], mask [N] of found ones), by damped Newton from
+    `start`.
+    """
+    fold = polynomial_fold(radial_coefficients("opencv", coefficients), _MAX_PLANE_RADIUS)
     plane = start
     residual = distort(plane, coefficients) - image
     size = np.hypot(*residual.T)
@@ -192,10 +196,10 @@ def _undistort(
             trial = plane - damping[:, None] * step
             trial_residual = distort(trial, coefficients) - image
             trial_size = np.hypot(*trial_residual.T)
-        better = (trial_size < size) & (np.hypot(*trial.T) <= fold)
-        plane = np.where(better[:, None], trial, plane)
-        residual = np.where(better[:, None], trial_residual, residual)
-        size = np.where(better, trial_size, size)
-        damping = np.where(better, np.minimum(1.0, 2.0 * damping), 0.5 * damping)
-    found = size <= 1e-9 * (1.0 + np.hypot(*image.T))
-    return np.where((found | start_reached)[:, None], plane, start), found
+        is_better = (trial_size < size) & (np.hypot(*trial.T) <= fold)
+        plane = np.where(is_better[:, None], trial, plane)
+        residual = np.where(is_better[:, None], trial_residual, residual)
+        size = np.where(is_better, trial_size, size)
+        damping = np.where(is_better, np.minimum(1.0, 2.0 * damping), 0.5 * damping)
+    is_found = size <= 1e-9 * (1.0 + np.hypot(*image.T))
+    return np.where((is_found | start_reached)[:, None], plane, start), is_found

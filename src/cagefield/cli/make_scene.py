@@ -82,7 +82,7 @@ class MakeScene:
         """Writes the capture of a room; the names of its parts."""
         from cagefield.files.atomic import replaced_folder
         from cagefield.procedural import capture, make_capture
-        from cagefield.procedural.capture_writer import OWN
+        from cagefield.procedural.capture_writer import CAPTURE_FILES
 
         if self.test_views is not None:
             raise CagefieldError(
@@ -91,7 +91,7 @@ class MakeScene:
         scene = capture(self.name).scene
         check_folder(self.out, self.overwrite, _CAPTURE_MARK)
         with (
-            replaced_folder(real_path(self.out), OWN) as draft,
+            replaced_folder(real_path(self.out), CAPTURE_FILES) as draft,
             progress_bar("Photos") as move,
         ):
             make_capture(

@@ -34,17 +34,17 @@ class PhotoOptions:
     def load(self, posed_in: Path | None = None, minutes: float | None = None) -> Dataset:
         """The data set; photos without poses get them first, in the folder `posed_in` where it is given.
 
-        For a training of `minutes` the photos are shrunk as `at_training_resolution` says.
+        For a training of `minutes` the photos are shrunk as `shrink_to_training_resolution` says.
         """
         from cagefield.datasets import load_dataset
-        from cagefield.datasets.training_resolution import at_training_resolution
+        from cagefield.datasets.training_resolution import shrink_to_training_resolution
 
         data = self.data if posed_in is None else posed(self.data, posed_in, self.masks)
         masks = self.masks if data.expanduser() == self.data.expanduser() else None
         dataset = load_dataset(data, downscale=self.downscale, holdout=self.holdout, masks=masks)
         if minutes is None or self.downscale is not None:
             return dataset
-        return at_training_resolution(dataset, minutes)
+        return shrink_to_training_resolution(dataset, minutes)
 
     def verified(self, dataset: Dataset, keep_poses: bool) -> Dataset:
         """The loaded data set with its poses verified; lines on stderr say its photos' size and pose error.

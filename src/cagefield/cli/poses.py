@@ -44,10 +44,10 @@ class Poses:
         """Write the data set, and print the number of registered photos."""
         from cagefield.datasets import load_dataset
         from cagefield.datasets.dataset_loader import has_photos_alone
-        from cagefield.datasets.sfm.transforms_writer import RECORD, write_transforms
+        from cagefield.datasets.sfm.transforms_writer import RECORD_FILE, write_transforms
 
         check_number("--frames", self.frames, 3, 10_000)
-        check_folder(self.out, self.overwrite, RECORD)
+        check_folder(self.out, self.overwrite, RECORD_FILE)
         if has_photos_alone(self.photos.expanduser()) or not self.photos.expanduser().exists():
             print(make(self.photos, self.out, self.frames, self.masks))
             verified(load_dataset(self.out, downscale=1), correct=False)
@@ -86,17 +86,17 @@ def posed(photos: Path, target: Path, masks: Path | None = None) -> Path:
     A data set that was made of the same photos before is used again.
     """
     from cagefield.datasets.dataset_loader import has_photos_alone
-    from cagefield.datasets.sfm.structure_from_motion import is_made_of
-    from cagefield.datasets.sfm.transforms_writer import RECORD
+    from cagefield.datasets.sfm.structure_from_motion import is_built_from
+    from cagefield.datasets.sfm.transforms_writer import RECORD_FILE
 
     photos = photos.expanduser()
     if not has_photos_alone(photos):
         return photos
-    recover_folder(real_path(target), lambda folder: (folder / RECORD).is_file())
-    if is_made_of(target, photos, masks=masks):
+    recover_folder(real_path(target), lambda folder: (folder / RECORD_FILE).is_file())
+    if is_built_from(target, photos, masks=masks):
         print(f"{photos} has no poses; those in {target} were found before")
         return target
-    check_folder(target, True, RECORD)
+    check_folder(target, True, RECORD_FILE)
     print(f"{photos} has no poses; finding them first, into {target}", flush=True)
     print(make(photos, target, masks=masks), flush=True)
     return target
@@ -107,10 +107,10 @@ def verified(dataset: Dataset, correct: bool = True, stream: TextIO | None = Non
 
     Lines about it go to `stream`, by default stdout.
     """
-    from cagefield.datasets.sfm.pose_verification import describe, poses_cache, verify_poses
+    from cagefield.datasets.sfm.pose_verification import describe, poses_cache_folder, verify_poses
 
     with stages() as move:
-        found = verify_poses(dataset, correct=correct, cache=poses_cache(), on_stage=move)
+        found = verify_poses(dataset, correct=correct, cache=poses_cache_folder(), on_stage=move)
     for line in describe(found):
         print(line, file=stream, flush=True)
     return found

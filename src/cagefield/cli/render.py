@@ -102,7 +102,7 @@ class Render:
         print(f"{count} in {self.out}")
 
     def _check_options(self) -> None:
-        from cagefield.cameras.camera_paths import LEAST_FPS, MOST_FPS
+        from cagefield.cameras.camera_paths import MAX_FPS, MIN_FPS
 
         if not 0 <= self.turntable <= 100_000:
             raise CagefieldError(
@@ -114,8 +114,8 @@ class Render:
             raise CagefieldError("--dataparser-transforms belongs to --camera-path; give both or neither")
         if self.compare and self.unedited:
             raise CagefieldError("--compare and --unedited exclude each other; give one of them")
-        if self.fps is not None and not LEAST_FPS <= self.fps <= MOST_FPS:
-            raise CagefieldError(f"--fps is {self.fps}; give a number from {LEAST_FPS:g} to {MOST_FPS:g}")
+        if self.fps is not None and not MIN_FPS <= self.fps <= MAX_FPS:
+            raise CagefieldError(f"--fps is {self.fps}; give a number from {MIN_FPS:g} to {MAX_FPS:g}")
         background = parse_background(self.background)
         if background == "none" and (self.compare or self.out.suffix.lower() == ".mp4"):
             raise CagefieldError(

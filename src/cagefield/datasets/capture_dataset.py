@@ -1,4 +1,4 @@
-"""What LLFF and COLMAP captures share: the data set, and photos of another size than their intrinsics say."""
+"""Data sets of unbounded captures, and intrinsics scaled to resized photos."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cagefield.cameras.camera import Camera
-from cagefield.datasets.far_origin import near_origin
+from cagefield.datasets.far_origin import move_near_origin
 from cagefield.datasets.notices import warn
 from cagefield.datasets.photos import read_header
 from cagefield.datasets.views import Dataset, SparsePoints, View, hold_out
@@ -19,16 +19,20 @@ from cagefield.files.safe_open import real_path
 Size = tuple[int, int]
 
 
-def unbounded_capture(
+def build_unbounded_dataset(
     folder: Path,
     views: Sequence[View],
     holdout: int,
     bounds: npt.NDArray[np.float64],
-    levelling: npt.NDArray[np.float64],
+    leveling: npt.NDArray[np.float64],
     depths: tuple[float, float] | None,
     points: SparsePoints | None = None,
 ) -> Dataset:
-    """The data set of photos of an unbounded scene, near the origin; every `holdout`-th view tests."""
+    """Data set of the photos of an unbounded scene, moved near the origin; every `holdout`-th view tests.
+
+    `bounds` [2,3] is the cube of interest and `leveling` [4,4] the rotation from the file's world to the data
+    set's; `depths` are the nearest and farthest depth, in world units.
+    """
     train, test = hold_out(views, holdout)
     dataset = Dataset(
         name=real_path(folder).name,
@@ -39,47 +43,48 @@ def unbounded_capture(
         unbounded=True,
         bounds=bounds,
         white_background=False,
-        source_to_world=levelling,
+        source_to_world=leveling,
         depths=depths,
         points=points,
     )
-    return near_origin(dataset, levelling[:3, :3].T)
+    return move_near_origin(dataset, leveling[:3, :3].T)
 
 
-def stored_camera(where: str, camera: Camera, photo: Path, factor: int) -> Camera:
-    """`camera` for the size of a photo stored at 1/`factor` of the camera's size.
+def resize_camera_to_photo(where: str, camera: Camera, photo: Path, factor: int) -> Camera:
+    """`camera` at the size of a photo stored at 1/`factor` of the camera's size.
 
-    Raises DatasetError where the photo's size differs from that by more than rounding.
+    Raises DatasetError where the photo's size differs from the expected one by more than rounding.
     """
     header = read_header(photo)
-    for side, found, full in (("wide", header.width, camera.width), ("high", header.height, camera.height)):
-        if abs(found * factor - full) >= factor:
+    for axis, stored, full in (("wide", header.width, camera.width), ("high", header.height, camera.height)):
+        if abs(stored * factor - full) >= factor:
             raise DatasetError(
-                f"{where}: {photo} is {found} pixels {side}, the intrinsics say {full}"
+                f"{where}: {photo} is {stored} pixels {axis}, the intrinsics say {full}"
                 + (f" / {factor}" if factor > 1 else "")
                 + "; use the photos that the intrinsics belong to"
             )
     return camera.resized(header.width, header.height)
 
 
-def uniform_size(said: Sequence[Size], found: Sequence[Size]) -> Size | None:
-    """The (width, height) of photos that were all scaled alike since the intrinsics were written, or None.
+def common_rescaled_size(camera_sizes: Sequence[Size], photo_sizes: Sequence[Size]) -> Size | None:
+    """(width, height) of photos that were all scaled alike since the intrinsics were written, or None.
 
-    That is where all of `found` have one size, all of `said` another, and their aspects agree to a pixel.
+    The photos count as scaled where all of `photo_sizes` are equal, all of `camera_sizes` are another size,
+    and the two aspects agree to a pixel.
     """
-    if len(set(said)) != 1 or len(set(found)) != 1 or said[0] == found[0]:
+    if len(set(camera_sizes)) != 1 or len(set(photo_sizes)) != 1 or camera_sizes[0] == photo_sizes[0]:
         return None
-    (width, height), (full_width, full_height) = found[0], said[0]
-    across, down = width / full_width, height / full_height
-    agrees = abs(width - down * full_width) <= max(1.0, down) or abs(height - across * full_height) <= max(
-        1.0, across
-    )
-    return found[0] if agrees else None
+    (width, height), (full_width, full_height) = photo_sizes[0], camera_sizes[0]
+    scale_x, scale_y = width / full_width, height / full_height
+    agrees = abs(width - scale_y * full_width) <= max(1.0, scale_y) or abs(
+        height - scale_x * full_height
+    ) <= max(1.0, scale_x)
+    return photo_sizes[0] if agrees else None
 
 
-def warn_of_scaling(where: str, said: Size, found: Size) -> None:
-    """Warns that intrinsics of `said` pixels are scaled to photos of `found` pixels."""
+def warn_of_scaling(where: str, camera_size: Size, photo_size: Size) -> None:
+    """Warn that intrinsics of `camera_size` pixels are scaled to photos of `photo_size` pixels."""
     warn(
-        f"{where}: the intrinsics are of {said[0]}x{said[1]} pixels, all photos have {found[0]}x{found[1]}: "
-        f"the intrinsics are scaled by {found[0] / said[0]:.4g}"
+        f"{where}: the intrinsics are of {camera_size[0]}x{camera_size[1]} pixels, all photos have "
+        f"{photo_size[0]}x{photo_size[1]}: the intrinsics are scaled by {photo_size[0] / camera_size[0]:.4g}"
     )

@@ -1,4 +1,4 @@
-"""Opening a data set of posed photos, whatever dialect it is in."""
+"""Loader of a data set of posed photos in any of the supported formats."""
 
 from __future__ import annotations
 
@@ -10,9 +10,14 @@ import numpy as np
 
 from cagefield.datasets.colmap.colmap_model import MODEL_FILES, find_model, load_colmap
 from cagefield.datasets.llff import POSES_FILE, load_llff
-from cagefield.datasets.mask_files import with_masks
+from cagefield.datasets.mask_files import attach_masks
 from cagefield.datasets.photos import report_conversions
-from cagefield.datasets.programs.capture_programs import LAYOUTS, Reader, program_of_file, program_of_folder
+from cagefield.datasets.programs.capture_programs import (
+    LAYOUTS,
+    Reader,
+    find_file_program,
+    find_folder_program,
+)
 from cagefield.datasets.raw_photos import find_raw_photos, is_video
 from cagefield.datasets.transforms.transforms_json_dataset import camera_file, load_transforms
 from cagefield.datasets.views import Dataset, View, check_holdout
@@ -20,48 +25,48 @@ from cagefield.errors import DatasetError
 
 __all__ = ["Dataset", "View", "has_photos_alone", "load_dataset"]
 
-_LOOKED_FOR = ("transforms.json", "transforms_train.json")
+_CAMERA_FILES = ("transforms.json", "transforms_train.json")
 
 
 def load_dataset(
     path: str | Path, *, downscale: int | None = None, holdout: int = 8, masks: Path | None = None
 ) -> Dataset:
-    """The data set at `path`: a folder, or the file in it that describes the cameras.
+    """Data set at `path`: a folder, or the file in it that describes the cameras.
 
     The first of these that a folder has is read: transforms_train.json (NeRF-synthetic), transforms.json
     (Instant-NGP, nerfstudio), poses_bounds.npy (LLFF), a COLMAP model in sparse/0, sparse or the folder
-    itself, what a capture program writes (see `capture_programs`). Naming the file, or the model's folder,
+    itself, the files of a capture program (see `capture_programs`). Naming the file, or the model's folder,
     overrides that order.
 
     `downscale` shrinks the photos by that factor; None takes the smallest power of two that brings the longer
-    side to 800 pixels or less. Test views are those that the files give, else every `holdout`-th, sorted by
-    name, from the first on; 0 holds none out. Frames whose photo is missing are left out with one warning.
-    Masks are those of the folder `masks`, else those beside the photos (see `mask_files`).
+    side to 800 pixels or less. Test views are the ones that the files give, else every `holdout`-th, sorted
+    by name, from the first on; 0 holds none out. Frames whose photo is missing are left out with one warning.
+    Masks come from the folder `masks`, else from files beside the photos (see `mask_files`).
 
-    Raises DatasetError, with file, key and cure, for anything that cannot be read, and for a `holdout` of
-    1 or below 0, whether there is a test split or not.
+    Raises DatasetError, with file, key and cure, for anything that cannot be read, and for a `holdout` of 1
+    or below 0, whether there is a test split or not.
     """
     check_holdout(holdout)
     path = Path(path).expanduser()
-    return with_masks(_load(path, downscale, holdout), masks)
+    return attach_masks(_load(path, downscale, holdout), masks)
 
 
 def _load(path: Path, downscale: int | None, holdout: int) -> Dataset:
-    """The data set without masks beside its photos."""
-    with _sensible_poses(path):
-        read, place = _reader_of(path)
-        dataset = read(place, downscale, holdout)
+    """Data set without the masks beside its photos."""
+    with _report_degenerate_poses(path):
+        read, source = _find_reader(path)
+        dataset = read(source, downscale, holdout)
     views = (*dataset.train, *dataset.test, *dataset.val)
     report_conversions(path, [view.image_path for view in views])
     return dataset
 
 
-def _reader_of(path: Path) -> tuple[Reader, Path]:
-    """Reader of the data set at `path`, and the folder or file that it reads."""
+def _find_reader(path: Path) -> tuple[Reader, Path]:
+    """Reader of the data set at `path`, and the folder or file that the reader takes."""
     if not path.exists():
         raise DatasetError(f"{path} does not exist; give the folder of the photos and their camera file")
     if path.is_file():
-        if (program := program_of_file(path)) is not None:
+        if (program := find_file_program(path)) is not None:
             return program
         if path.suffix == ".json":
             return load_transforms, path
@@ -80,7 +85,7 @@ def _reader_of(path: Path) -> tuple[Reader, Path]:
         return load_llff, path
     if find_model(path) is not None:
         return load_colmap, path
-    if (program := program_of_folder(path)) is not None:
+    if (program := find_folder_program(path)) is not None:
         return program
     if has_photos_alone(path):
         raise DatasetError(
@@ -88,14 +93,14 @@ def _reader_of(path: Path) -> tuple[Reader, Path]:
             "train does that by itself)"
         )
     raise DatasetError(
-        f"{path}: no camera file; looked for {', '.join(_LOOKED_FOR)}, {POSES_FILE}, a COLMAP model "
+        f"{path}: no camera file; looked for {', '.join(_CAMERA_FILES)}, {POSES_FILE}, a COLMAP model "
         f"(sparse/0/cameras.bin or .txt), {LAYOUTS}, and there are no photos either"
     )
 
 
 @contextmanager
-def _sensible_poses(path: Path) -> Iterator[None]:
-    """Raises DatasetError for numbers that no camera has."""
+def _report_degenerate_poses(path: Path) -> Iterator[None]:
+    """Raise DatasetError in place of NumPy's errors for poses that no camera has."""
     try:
         yield
     except (np.linalg.LinAlgError, OverflowError) as error:
@@ -110,6 +115,6 @@ def has_photos_alone(path: Path) -> bool:
         return is_video(path)
     if not path.is_dir() or camera_file(path) is not None or (path / POSES_FILE).is_file():
         return False
-    if find_model(path) is not None or program_of_folder(path) is not None:
+    if find_model(path) is not None or find_folder_program(path) is not None:
         return False
     return bool(find_raw_photos(path))

@@ -1,9 +1,9 @@
-"""LLFF data sets: `poses_bounds.npy` and the photos it was made from.
+"""LLFF data sets: `poses_bounds.npy` and its photos.
 
 Each row of the array [N,17] is a matrix [3,5], row by row, and the near and far depth of one photo, in the
 order of the sorted file names. The matrix's columns are the camera's down, right and backward axes, its
-position, and (height, width, focal length) in pixels. There is no lens distortion in the format, and no
-points: where the folder also has the COLMAP model that the poses came from, both are taken from it.
+position, and (height, width, focal length) in pixels. The format has no lens distortion and no points: where
+the folder also has the COLMAP model that the poses came from, both are taken from the model.
 """
 
 from __future__ import annotations
@@ -20,17 +20,23 @@ import numpy.typing as npt
 from cagefield.cameras.camera import Camera
 from cagefield.datasets.capture_dataset import (
     Size,
-    stored_camera,
-    unbounded_capture,
-    uniform_size,
+    build_unbounded_dataset,
+    common_rescaled_size,
+    resize_camera_to_photo,
     warn_of_scaling,
 )
 from cagefield.datasets.colmap.colmap_lenses import LensView, report_resampled
-from cagefield.datasets.colmap.colmap_model import find_model, lenses_of, pose_of, read_model, sparse_points
+from cagefield.datasets.colmap.colmap_model import (
+    find_model,
+    image_pose,
+    read_model,
+    sparse_points,
+    view_lenses,
+)
 from cagefield.datasets.notices import warn
 from cagefield.datasets.photo_names import photo_files
 from cagefield.datasets.photos import FULL_SIZE_FOLDERS, choose_downscale, photo_folders, read_header
-from cagefield.datasets.scene_bounds import cube_of_interest, levelling_rotation
+from cagefield.datasets.scene_bounds import cube_of_interest, leveling_rotation
 from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.errors import CameraError, DatasetError
 from cagefield.files.npz import read_array
@@ -41,10 +47,10 @@ POSES_FILE = "poses_bounds.npy"
 
 
 def load_llff(path: Path, downscale: int | None, holdout: int) -> Dataset:
-    """The unbounded data set of a folder with `poses_bounds.npy`, or of that file.
+    """Unbounded data set of a folder with `poses_bounds.npy`, or of that file.
 
     Every `holdout`-th view tests. The world is rotated so that up is +z and the cameras look towards +y (see
-    `levelling_rotation`). Photos come from `images`, `images_4`, ...: the folder whose factor is the largest
+    `leveling_rotation`). Photos come from `images`, `images_4`, ...: the folder whose factor is the largest
     that divides the factor wanted. Where all photos in `images` have one size and the file another with the
     same aspect, the intrinsics are scaled, with a warning.
     """
@@ -55,8 +61,8 @@ def load_llff(path: Path, downscale: int | None, holdout: int) -> Dataset:
     down, right, back, position = np.moveaxis(matrices[:, :, :4], 2, 0)
     poses = np.tile(np.eye(4), (len(rows), 1, 1))
     poses[:, :3] = np.stack([right, -down, back, position], axis=2)
-    levelling = np.eye(4)
-    levelling[:3, :3] = levelling_rotation(poses)
+    leveling = np.eye(4)
+    leveling[:3, :3] = leveling_rotation(poses)
 
     folders, photos = _photos(folder, len(rows))
     complete = {factor: folders[factor] for factor, found in photos.items() if len(found) == len(rows)}
@@ -67,11 +73,11 @@ def load_llff(path: Path, downscale: int | None, holdout: int) -> Dataset:
             "photos are paired by order, so all of them must be there"
         )
     sizes = [(int(width), int(height)) for height, width in matrices[:, :2, 4]]
-    scaled = _scaled(photos[1], sizes) if 1 in complete else None
-    if scaled is not None:
-        warn_of_scaling(str(file), sizes[0], scaled)
-        matrices[:, :, 4] *= scaled[0] / sizes[0][0]
-        matrices[:, :2, 4] = scaled[::-1]
+    rescaled_size = _find_rescaled_size(photos[1], sizes) if 1 in complete else None
+    if rescaled_size is not None:
+        warn_of_scaling(str(file), sizes[0], rescaled_size)
+        matrices[:, :, 4] *= rescaled_size[0] / sizes[0][0]
+        matrices[:, :2, 4] = rescaled_size[::-1]
         complete = {1: complete[1]}  # the names of the others count from the old size
     factor = choose_downscale(int(matrices[:, :2, 4].max()), downscale, complete)
     stored = max(f for f in complete if factor % f == 0)
@@ -82,58 +88,60 @@ def load_llff(path: Path, downscale: int | None, holdout: int) -> Dataset:
         height, width, focal = matrices[index, :, 4]
         try:
             camera = Camera(
-                levelling @ poses[index], width, height, focal, focal, 0.5 * float(width), 0.5 * float(height)
+                leveling @ poses[index], width, height, focal, focal, 0.5 * float(width), 0.5 * float(height)
             )
             lens = None if model is None else model.lenses[index].resized(camera.width, camera.height)
             if lens is not None:
                 camera = lens.camera.with_c2w(camera.c2w)
         except CameraError as error:
             raise DatasetError(f"{where}: {error}") from error
-        camera = stored_camera(where, camera, photo, stored)
+        camera = resize_camera_to_photo(where, camera, photo, stored)
         view = View(photo.name, camera, photo, source=None if lens is None else lens.source)
         views.append(view.downscaled(factor // stored))
     if model is not None:
         report_resampled(str(file), model.lenses)
-    points = None if model is None else model.points([view.name for view in views], levelling)
+    points = None if model is None else model.points([view.name for view in views], leveling)
     positions = None if points is None else points.positions
     bounds = cube_of_interest([view.camera for view in views], rows[:, 15:], positions)
     depths = float(rows[:, 15].min()), float(rows[:, 16].max())
-    return unbounded_capture(folder, views, holdout, bounds, levelling, depths, points)
+    return build_unbounded_dataset(folder, views, holdout, bounds, leveling, depths, points)
 
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """The COLMAP model that the poses came from: lenses by row, and how it moves into the file's world."""
+    """COLMAP model that the poses came from: lenses by row, and the similarity `to_file` [4,4] to the file's
+    world.
+    """
 
     reconstruction: Any
     names: tuple[str, ...]
     lenses: tuple[LensView, ...]
     to_file: FloatArray
 
-    def points(self, views: Sequence[str], levelling: FloatArray) -> SparsePoints | None:
-        """Its points in the data set's world; `views` are the views' names by row."""
+    def points(self, views: Sequence[str], leveling: FloatArray) -> SparsePoints | None:
+        """Sparse points of the model in the data set's world; `views` are the views' names by row."""
         names = dict(zip(self.names, views, strict=True))
-        return sparse_points(self.reconstruction, names, levelling @ self.to_file)
+        return sparse_points(self.reconstruction, names, leveling @ self.to_file)
 
 
 def _matching_model(folder: Path, poses: FloatArray) -> _Model | None:
-    """The folder's COLMAP model where it has the same cameras as `poses` [N,4,4], moved by a similarity.
+    """COLMAP model in the folder whose cameras are `poses` [N,4,4] up to a similarity.
 
-    None where there is none, where it has other cameras, and where pycolmap is missing.
+    None where there is no model, where its cameras differ, and where pycolmap is missing.
     """
-    place = find_model(folder)
-    if place is None or importlib.util.find_spec("pycolmap") is None:
+    model_folder = find_model(folder)
+    if model_folder is None or importlib.util.find_spec("pycolmap") is None:
         return None
     try:
-        reconstruction, images = read_model(place)
+        reconstruction, images = read_model(model_folder)
         images.sort(key=lambda image: image.name)
-        views = [lenses_of(place, reconstruction.cameras[image.camera_id]) for image in images]
+        views = [view_lenses(model_folder, reconstruction.cameras[image.camera_id]) for image in images]
     except DatasetError as error:
         warn(f"{error}; {folder / POSES_FILE} is used without lens and points")
         return None
     if len(images) != len(poses) or any(len(faces) > 1 for faces in views):
         return None
-    to_file = _similarity(np.stack([pose_of(image) for image in images]), poses)
+    to_file = _similarity(np.stack([image_pose(image) for image in images]), poses)
     if to_file is None:
         return None
     return _Model(
@@ -142,7 +150,7 @@ def _matching_model(folder: Path, poses: FloatArray) -> _Model | None:
 
 
 def _similarity(source: FloatArray, target: FloatArray) -> FloatArray | None:
-    """The similarity [4,4] that takes poses [N,4,4] to others; None where they differ by more.
+    """Similarity [4,4] that takes poses [N,4,4] to others; None where the rest error is too large.
 
     Allowed are half a degree, and a hundredth of the cameras' spread.
     """
@@ -150,24 +158,24 @@ def _similarity(source: FloatArray, target: FloatArray) -> FloatArray | None:
     left, _, right = np.linalg.svd(rotations.sum(axis=0))
     rotation = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
     cosines = 0.5 * (np.einsum("nij,ij->n", rotations, rotation) - 1.0)
-    turned = source[:, :3, 3] @ rotation.T
-    first, second = turned - turned.mean(axis=0), target[:, :3, 3] - target[:, :3, 3].mean(axis=0)
+    rotated = source[:, :3, 3] @ rotation.T
+    first, second = rotated - rotated.mean(axis=0), target[:, :3, 3] - target[:, :3, 3].mean(axis=0)
     square = float((first**2).sum())
     scale = float((first * second).sum()) / square if square > 0 else 1.0
-    misses = np.linalg.norm(scale * first - second, axis=1)
+    offsets = np.linalg.norm(scale * first - second, axis=1)
     spread = np.linalg.norm(second, axis=1).max()
-    if scale <= 0 or cosines.min() < np.cos(np.radians(0.5)) or misses.max() > 0.01 * spread:
+    if scale <= 0 or cosines.min() < np.cos(np.radians(0.5)) or offsets.max() > 0.01 * spread:
         return None
     matrix = np.eye(4)
     matrix[:3, :3] = scale * rotation
-    matrix[:3, 3] = target[:, :3, 3].mean(axis=0) - scale * turned.mean(axis=0)
+    matrix[:3, 3] = target[:, :3, 3].mean(axis=0) - scale * rotated.mean(axis=0)
     return matrix
 
 
-def _scaled(photos: Sequence[Path], sizes: Sequence[Size]) -> Size | None:
-    """The size of photos that were scaled down since `sizes` (width, height) were written, else None."""
+def _find_rescaled_size(photos: Sequence[Path], sizes: Sequence[Size]) -> Size | None:
+    """(width, height) of photos that were scaled since `sizes` were written, else None."""
     headers = [read_header(photo) for photo in photos]
-    return uniform_size(sizes, [(header.width, header.height) for header in headers])
+    return common_rescaled_size(sizes, [(header.width, header.height) for header in headers])
 
 
 def _read_rows(file: Path) -> npt.NDArray[np.float64]:
@@ -197,13 +205,16 @@ def _read_rows(file: Path) -> npt.NDArray[np.float64]:
 
 
 def _photos(folder: Path, count: int) -> tuple[dict[int, Path], dict[int, list[Path]]]:
-    """The photo folders by factor and their photos: the first that has `count` of them, else the first."""
+    """(photo folders by factor, their photos): the first set that has `count` photos, else the first."""
     whole = [name for name in FULL_SIZE_FOLDERS if (folder / name).is_dir()]
     places = [photo_folders(folder, name) for name in whole or [""]]
     if len(photo_files(folder)) == count:
         places.append({1: folder})
-    found = [(place, {factor: photo_files(images) for factor, images in place.items()}) for place in places]
-    for place, photos in found:
+    found = [
+        (model_folder, {factor: photo_files(images) for factor, images in model_folder.items()})
+        for model_folder in places
+    ]
+    for model_folder, photos in found:
         if any(len(files) == count for files in photos.values()):
-            return place, photos
+            return model_folder, photos
     return found[0]

@@ -1,8 +1,8 @@
-"""Masks of photos found by their names: in a folder of masks, or beside the photos.
+"""Mask files found by the names of the photos: in a folder of masks, or beside the photos.
 
 A folder of masks has NAME.png for the photo NAME, with its extension (`a.jpg.png`, COLMAP's way) or without
-(`a.png`), in the same folders or without them; black excludes. Beside a photo it is `dynamic_mask_NAME.png`,
-where white excludes (Instant-NGP).
+(`a.png`), in the photo's subfolders or without them; black excludes. Beside a photo its mask is
+`dynamic_mask_NAME.png`, where white excludes (Instant-NGP).
 """
 
 from __future__ import annotations
@@ -14,27 +14,31 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from cagefield.datasets.hidden_files import DYNAMIC_MASK
+from cagefield.datasets.hidden_files import DYNAMIC_MASK_PREFIX
 from cagefield.datasets.masks import check_aspect, read_mask
 from cagefield.datasets.notices import warn
-from cagefield.datasets.photo_names import name_key, picture_tree, stem_key
+from cagefield.datasets.photo_names import iterate_image_paths, name_key, stem_key
 from cagefield.datasets.photos import EXTENSIONS, read_header
-from cagefield.datasets.views import Dataset, PhotoMask, View, named
+from cagefield.datasets.views import Dataset, PhotoMask, View, join_names
 from cagefield.errors import DatasetError
 
 
 class MaskFolder:
-    """The masks of a folder, by the names of photos."""
+    """Mask files of a folder, indexed by the photos' names."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.files: dict[tuple[str, ...], Path] = {}
-        for parts in picture_tree(folder):
+        for parts in iterate_image_paths(folder):
             key = (*map(name_key, parts[:-1]), stem_key(parts[-1]))
             self.files.setdefault(key, folder.joinpath(*parts))
 
-    def of(self, names: Iterable[str]) -> dict[str, Path]:
-        """The masks of photos: in the same folders, else in fewer of them where it fits one photo."""
+    def find_masks(self, names: Iterable[str]) -> dict[str, Path]:
+        """Mask file of each photo name that has one.
+
+        A mask in the photo's subfolders is preferred, else one in fewer of them where it fits one photo
+        alone.
+        """
         found: dict[str, Path] = {}
         loose: dict[Path, list[str]] = {}
         for name in dict.fromkeys(names):
@@ -48,21 +52,23 @@ class MaskFolder:
                     break
         for file, photos in loose.items():
             if len(photos) > 1:
-                warn(f"{file}: it fits {len(photos)} photos and is used for none: {named(photos)}")
+                warn(f"{file}: it fits {len(photos)} photos and is used for none: {join_names(photos)}")
             else:
                 found[photos[0]] = file
         return found
 
     def report_unused(self, used: Iterable[Path]) -> None:
-        """Warns once of masks that are of no photo."""
-        taken = set(used)
-        unused = [str(file.relative_to(self.folder)) for file in self.files.values() if file not in taken]
+        """Warn once of masks that belong to no photo."""
+        used_files = set(used)
+        unused = [
+            str(file.relative_to(self.folder)) for file in self.files.values() if file not in used_files
+        ]
         if unused:
-            warn(f"{self.folder}: {len(unused)} masks are of no photo: {named(unused)}")
+            warn(f"{self.folder}: {len(unused)} masks are of no photo: {join_names(unused)}")
 
 
-def opened_folder(folder: Path) -> MaskFolder:
-    """The folder of masks that the user names. Raises DatasetError where there is none, or nothing in it."""
+def open_mask_folder(folder: Path) -> MaskFolder:
+    """Folder of masks that the user names. Raises DatasetError where it is missing or has no masks."""
     if not folder.is_dir():
         raise DatasetError(f"{folder} is no folder; give the folder of the masks, NAME.png for each photo")
     found = MaskFolder(folder)
@@ -71,21 +77,21 @@ def opened_folder(folder: Path) -> MaskFolder:
     return found
 
 
-def dynamic_mask(photo: Path) -> Path | None:
-    """Instant-NGP's mask beside a photo, None where it has none."""
+def find_dynamic_mask(photo: Path) -> Path | None:
+    """Instant-NGP's mask beside a photo, None where there is none."""
     for name in (photo.stem, photo.name):
         for extension in EXTENSIONS:
-            file = photo.with_name(f"{DYNAMIC_MASK}{name}{extension}")
+            file = photo.with_name(f"{DYNAMIC_MASK_PREFIX}{name}{extension}")
             if file.is_file():
                 return file
     return None
 
 
-def with_masks(dataset: Dataset, folder: Path | None = None) -> Dataset:
-    """The data set with the masks of `folder`, else with those that its files name or that are beside photos.
+def attach_masks(dataset: Dataset, folder: Path | None = None) -> Dataset:
+    """Data set with the masks of `folder`, else with the masks that its files name or that lie beside photos.
 
-    One warning says how many photos have masks, and what share of them they exclude; photos of which they
-    exclude all are left out, and named.
+    One warning gives the number of masked photos and the excluded share of their pixels; photos that are
+    wholly excluded are left out, and named.
 
     Raises DatasetError where `folder` has no mask of any photo, a mask cannot be read or has another aspect
     than its photo, and where no training photo is left.
@@ -93,11 +99,11 @@ def with_masks(dataset: Dataset, folder: Path | None = None) -> Dataset:
     views = {view.image_path: view for part in _splits(dataset) for view in part}
     if folder is None:
         masks = {photo: view.mask for photo, view in views.items() if view.mask is not None}
-        masks |= _beside(dataset.path, [view for view in views.values() if view.mask is None])
+        masks |= _masks_beside(dataset.path, [view for view in views.values() if view.mask is None])
     else:
-        given = opened_folder(folder.expanduser())
+        given = open_mask_folder(folder.expanduser())
         names = {_photo_name(view): photo for photo, view in views.items()}
-        found = given.of(names)
+        found = given.find_masks(names)
         if not found:
             raise DatasetError(
                 f"{folder}: none of its {len(given.files)} masks is of a photo of {dataset.path}; name them "
@@ -116,7 +122,8 @@ def with_masks(dataset: Dataset, folder: Path | None = None) -> Dataset:
     if empty:
         left_out = [_photo_name(view) for photo, view in views.items() if photo in empty]
         warn(
-            f"{dataset.path}: {len(empty)} photos are left out, masks exclude all of them: {named(left_out)}"
+            f"{dataset.path}: {len(empty)} photos are left out, masks exclude all of them: "
+            f"{join_names(left_out)}"
         )
 
     def masked(part: Sequence[View]) -> tuple[View, ...]:
@@ -133,7 +140,9 @@ def with_masks(dataset: Dataset, folder: Path | None = None) -> Dataset:
 
 
 def _excluded_share(photo: Path, mask: PhotoMask) -> float:
-    """The share of a photo that its mask excludes. Raises DatasetError where the mask is not the photo's."""
+    """Share of a photo that its mask excludes. Raises DatasetError where the mask's aspect is not the
+    photo's.
+    """
     valid, header = read_mask(mask.path, mask.excluded), read_header(photo)
     check_aspect(valid, header.width, header.height, mask.path)
     return 1.0 - float(valid.mean())
@@ -144,41 +153,43 @@ def _splits(dataset: Dataset) -> tuple[tuple[View, ...], ...]:
 
 
 def _photo_name(view: View) -> str:
-    """The view's name with the name of its photo's file, which a panorama's face has not."""
+    """Name of the view's photo: the view's name with the file name of its photo (a panorama's face has its
+    own).
+    """
     return str(PurePosixPath(view.name).with_name(view.image_path.name))
 
 
-def _beside(path: Path, views: Sequence[View]) -> Mapping[Path, PhotoMask]:
-    """Masks in folders `masks` of the data set, and beside photos."""
+def _masks_beside(path: Path, views: Sequence[View]) -> Mapping[Path, PhotoMask]:
+    """Masks by photo, from folders `masks` of the data set and from files beside the photos."""
     found: dict[Path, PhotoMask] = {}
     folders: dict[tuple[Path, ...], list[View]] = {}
-    places: dict[Path, tuple[Path, ...]] = {}
+    candidates: dict[Path, tuple[Path, ...]] = {}
     for view in views:
         parent = view.image_path.parent
-        if parent not in places:
-            places[parent] = tuple(folder for folder in _mask_folders(path, parent) if folder.is_dir())
-        folders.setdefault(places[parent], []).append(view)
-    used: dict[Path, MaskFolder] = {}
-    taken: list[Path] = []
-    for those, some in folders.items():
-        for place in those:
-            folder = used.setdefault(place, MaskFolder(place))
-            names = {_photo_name(view): view.image_path for view in some if view.image_path not in found}
-            for name, file in folder.of(names).items():
+        if parent not in candidates:
+            candidates[parent] = tuple(folder for folder in _mask_folders(path, parent) if folder.is_dir())
+        folders.setdefault(candidates[parent], []).append(view)
+    mask_folders: dict[Path, MaskFolder] = {}
+    used_files: list[Path] = []
+    for folders_of_masks, group in folders.items():
+        for mask_folder in folders_of_masks:
+            folder = mask_folders.setdefault(mask_folder, MaskFolder(mask_folder))
+            names = {_photo_name(view): view.image_path for view in group if view.image_path not in found}
+            for name, file in folder.find_masks(names).items():
                 found[names[name]] = PhotoMask(file)
-                taken.append(file)
-    for folder in used.values():
-        if any(file in taken for file in folder.files.values()):
-            folder.report_unused(taken)
+                used_files.append(file)
+    for folder in mask_folders.values():
+        if any(file in used_files for file in folder.files.values()):
+            folder.report_unused(used_files)
     for view in views:
-        beside = dynamic_mask(view.image_path)
+        beside = find_dynamic_mask(view.image_path)
         if beside is not None and view.image_path not in found:
             found[view.image_path] = PhotoMask(beside, "white")
     return found
 
 
 def _mask_folders(path: Path, photos: Path) -> list[Path]:
-    """Where the masks of a folder of photos may be: beside it or a folder above it, within the data set."""
+    """Candidate mask folders of a folder of photos: beside it or a folder above it, within the data set."""
     found: list[Path] = []
     base = path if path.is_dir() else path.parent
     for folder in (photos, *photos.parents)[:4]:

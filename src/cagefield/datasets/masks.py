@@ -1,4 +1,4 @@
-"""Masks: pictures that say which pixels of a photo may be used, at the photo's size or another one."""
+"""Masks [H,W] of the valid pixels of a photo: reading, resampling, shrinking."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from cagefield.images.image_files import read_image
 Excluded = Literal["black", "white"]
 BoolArray = npt.NDArray[np.bool_]
 
-LEAST_VALID = 128
-"""8-bit value from which a pixel of a mask with black exclusions is valid."""
+MIN_VALID_VALUE = 128
+"""Minimum 8-bit value of a valid pixel in a mask with black exclusions."""
 
 
 def read_mask(path: Path, excluded: Excluded) -> BoolArray:
     """Valid pixels [H,W] of a mask file at its own size.
 
-    "black": valid from LEAST_VALID on, in the mean of the channels (nerfstudio, COLMAP); "white": valid where
-    every channel is 0 (Instant-NGP's dynamic masks). Alpha is not looked at.
+    "black": valid from MIN_VALID_VALUE on, in the mean of the channels (nerfstudio, COLMAP); "white": valid
+    where every channel is 0 (Instant-NGP's dynamic masks). The alpha channel is ignored.
 
-    Raises DatasetError where the file is missing or no picture.
+    Raises DatasetError where the file is missing or no image.
     """
     pixels = read_image(path)[..., :3]
     if excluded == "white":
         return np.asarray(~pixels.any(axis=2))
-    return np.asarray(pixels.mean(axis=2, dtype=np.float32) >= LEAST_VALID)
+    return np.asarray(pixels.mean(axis=2, dtype=np.float32) >= MIN_VALID_VALUE)
 
 
 def resample_mask(valid: BoolArray, width: int, height: int, path: Path) -> BoolArray:
-    """The mask [height,width] by nearest neighbors.
+    """Mask [height,width] resampled by nearest neighbors.
 
     Raises DatasetError where its aspect differs; see `check_aspect`.
     """
@@ -47,11 +47,11 @@ def resample_mask(valid: BoolArray, width: int, height: int, path: Path) -> Bool
 
 
 def check_aspect(valid: BoolArray, width: int, height: int, path: Path) -> None:
-    """Raises DatasetError where the mask has another aspect than its photo, by more than rounding."""
+    """Raise DatasetError where the mask has another aspect than its photo, by more than rounding."""
     mask_height, mask_width = valid.shape
-    across, down = width / mask_width, height / mask_height
-    if abs(width - down * mask_width) > max(1.0, down) and abs(height - across * mask_height) > max(
-        1.0, across
+    scale_x, scale_y = width / mask_width, height / mask_height
+    if abs(width - scale_y * mask_width) > max(1.0, scale_y) and abs(height - scale_x * mask_height) > max(
+        1.0, scale_x
     ):
         raise DatasetError(
             f"{path}: the mask is {mask_width}x{mask_height}, its photo {width}x{height}; make a mask of the "
@@ -60,7 +60,7 @@ def check_aspect(valid: BoolArray, width: int, height: int, path: Path) -> None:
 
 
 def shrink_mask(valid: BoolArray, factor: int) -> BoolArray:
-    """The mask of means of `factor` x `factor` pixels: valid where all of them are.
+    """Mask of the blocks of `factor` x `factor` pixels: valid where all pixels of a block are.
 
     Columns and rows left over at the right and bottom are dropped, as of photos.
     """

@@ -1,4 +1,4 @@
-"""Order of file names by the numbers in them."""
+"""Natural order of file names, with the numbers in them by value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Photos by the names that camera files give them, on whatever machine these were written.
+"""Photo files found by the names that a camera file gives them, written on any system.
 
 A name is looked for as it is, then with another separator, URL-decoded, with another case, Unicode form or
 image extension, and at last by its end: the file below the folder that shares most of the name's last parts.
@@ -20,17 +20,24 @@ from urllib.parse import unquote
 from cagefield.datasets.hidden_files import is_hidden
 from cagefield.datasets.notices import warn
 from cagefield.datasets.photos import EXTENSIONS, find_photo
-from cagefield.datasets.raw_photos import OTHER_PHOTOS
-from cagefield.datasets.views import named
+from cagefield.datasets.raw_photos import RAW_EXTENSIONS
+from cagefield.datasets.views import join_names
 
-MAX_DEPTH = 6
-"""Folders below a data set in which photos are looked for."""
+MAX_FOLDER_DEPTH = 6
+"""Maximum depth of folders below a data set in which photos are looked for."""
 
-MAX_FILES = 200_000
+MAX_INDEXED_FILES = 200_000
 
-_LONGEST = 4096  # characters of a name
-_PICTURES = frozenset({*EXTENSIONS, *OTHER_PHOTOS})
-_SECONDARY = ("mask", "depth", "normal", "thumb", "images_", "dynamic_mask")  # beginnings of folders' names
+_MAX_NAME_CHARACTERS = 4096  # characters of a name
+_IMAGE_EXTENSIONS = frozenset({*EXTENSIONS, *RAW_EXTENSIONS})
+_SECONDARY_FOLDER_PREFIXES = (
+    "mask",
+    "depth",
+    "normal",
+    "thumb",
+    "images_",
+    "dynamic_mask",
+)  # beginnings of folders' names
 
 
 def view_name(name: str) -> str:
@@ -39,7 +46,7 @@ def view_name(name: str) -> str:
 
 
 def photo_files(folder: Path) -> list[Path]:
-    """The photos of a folder by name, without hidden ones and those of its folders."""
+    """Photos directly in a folder, sorted by name, without hidden files."""
     return sorted(
         file for file in folder.iterdir() if file.suffix.lower() in EXTENSIONS and not is_hidden([file.name])
     )
@@ -47,11 +54,11 @@ def photo_files(folder: Path) -> list[Path]:
 
 @dataclass
 class FoundPhotos:
-    """Photos by names of a camera file.
+    """Photo files by the names of a camera file.
 
     Attributes:
         photos: the files of the names that were found.
-        moved: those found by the end of their name alone.
+        moved: the files found by the end of their name alone.
         ambiguous: names whose end several files share, or several names one file.
     """
 
@@ -59,13 +66,13 @@ class FoundPhotos:
     moved: dict[str, Path] = field(default_factory=dict)
     ambiguous: list[str] = field(default_factory=list)
 
-    def name_of(self, name: str, base: Path) -> str:
-        """The view's name: the name itself, or of a moved photo its path below `base`."""
+    def relative_view_name(self, name: str, base: Path) -> str:
+        """Name of the photo's view: the name itself, or of a moved photo its path below `base`."""
         path = self.moved.get(name)
         return view_name(name) if path is None else Path(os.path.relpath(path, base)).as_posix()
 
     def report(self, where: Path, base: Path) -> None:
-        """Warns of photos that are not where the names say, and of names that could be several photos'."""
+        """Warn of photos that are not where the names say, and of names that could be several photos'."""
         if self.moved:
             name, path = next(iter(self.moved.items()))
             warn(
@@ -75,15 +82,15 @@ class FoundPhotos:
         if self.ambiguous:
             warn(
                 f"{where}: the ends of {len(self.ambiguous)} names fit several photos below {base}, or one "
-                f"photo several of them: {named(self.ambiguous)}; put the photos where the file says"
+                f"photo several of them: {join_names(self.ambiguous)}; put the photos where the file says"
             )
 
 
 def find_photos(base: Path, names: Iterable[str]) -> FoundPhotos:
-    """The photos that `names`, relative to the folder `base`, are of."""
+    """Photo files of `names`, which are relative to the folder `base`."""
     found, rest = FoundPhotos(), []
     for name in dict.fromkeys(names):
-        photo = _exact(base, name)
+        photo = _find_exact(base, name)
         if photo is None:
             rest.append(name)
         else:
@@ -91,16 +98,16 @@ def find_photos(base: Path, names: Iterable[str]) -> FoundPhotos:
     if not rest:
         return found
     taken = {os.path.realpath(photo) for photo in found.photos.values()}
-    tree = _Tree(base)
-    wanted: dict[Path, list[tuple[str, bool]]] = defaultdict(list)
+    tree = _PhotoTree(base)
+    claims_by_path: dict[Path, list[tuple[str, bool]]] = defaultdict(list)
     for name in rest:
-        candidates, moved = tree.like(name)
+        candidates, moved = tree.find_similar(name)
         free = [path for path in candidates if os.path.realpath(path) not in taken]
         if len(free) == 1:
-            wanted[free[0]].append((name, moved))
+            claims_by_path[free[0]].append((name, moved))
         elif free:
             found.ambiguous.append(name)
-    for path, claims in wanted.items():
+    for path, claims in claims_by_path.items():
         if len({view_name(name) for name, _ in claims}) > 1:
             found.ambiguous += [name for name, _ in claims]
             continue
@@ -111,8 +118,8 @@ def find_photos(base: Path, names: Iterable[str]) -> FoundPhotos:
     return found
 
 
-def _exact(base: Path, name: str) -> Path | None:
-    if len(name) > _LONGEST:
+def _find_exact(base: Path, name: str) -> Path | None:
+    if len(name) > _MAX_NAME_CHARACTERS:
         return None
     for text in dict.fromkeys((name, view_name(name), unquote(view_name(name)))):
         with contextlib.suppress(OSError, ValueError):  # a part that is too long, a zero in it
@@ -123,18 +130,18 @@ def _exact(base: Path, name: str) -> Path | None:
 
 
 def name_key(part: str) -> str:
-    """A part of a name as parts are compared: composed, without case."""
+    """Comparison key of one part of a path: composed Unicode, case-folded."""
     return unicodedata.normalize("NFC", part).casefold()
 
 
 def stem_key(name: str) -> str:
-    """The key of a file's name without its image extension."""
+    """Comparison key of a file's name without its image extension."""
     stem, extension = os.path.splitext(name)
-    return name_key(stem if extension.lower() in _PICTURES else name)
+    return name_key(stem if extension.lower() in _IMAGE_EXTENSIONS else name)
 
 
-class _Tree:
-    """The photos below a folder."""
+class _PhotoTree:
+    """Index of the photos below a folder."""
 
     def __init__(self, base: Path) -> None:
         self._base = base
@@ -143,8 +150,8 @@ class _Tree:
     def _by_stem(self) -> dict[str, list[tuple[str, ...]]]:
         """Parts of the paths below the folder, by the key of the stem."""
         index: dict[str, list[tuple[str, ...]]] = defaultdict(list)
-        for count, parts in enumerate(picture_tree(self._base)):
-            if count >= MAX_FILES:
+        for count, parts in enumerate(iterate_image_paths(self._base)):
+            if count >= MAX_INDEXED_FILES:
                 break
             index[stem_key(parts[-1])].append(parts)
         return index
@@ -158,43 +165,44 @@ class _Tree:
             for length in range(1, len(parts))
         }
 
-    def like(self, name: str) -> tuple[list[Path], bool]:
-        """Files that may be the photo `name`, and whether they are elsewhere than it says.
+    def find_similar(self, name: str) -> tuple[list[Path], bool]:
+        """(files that may be the photo `name`, whether they lie in another folder than the name says).
 
-        In a folder that the name gives and that is there, a file of its stem; else those of the longest end.
+        In a folder that the name gives and that exists, the files of its stem; else the files that share the
+        longest end.
         """
         text = unquote(view_name(name)) if "%" in name else view_name(name)
         parts = tuple(part for part in PurePosixPath(text).parts if part not in ("/", ".."))
         if not parts:
             return [], False
         folder = tuple(map(name_key, parts[:-1]))
-        same = self._by_stem.get(stem_key(parts[-1]), [])
-        here = [one for one in same if tuple(map(name_key, one[:-1])) == folder]
-        if here or (folder and folder in self._folders):
-            return self._paths(_preferred(here, parts[-1])), False
-        lengths = [_common_end(one[:-1], parts[:-1]) for one in same]
-        longest = [one for one, length in zip(same, lengths, strict=True) if length == max(lengths)]
-        return self._paths(_preferred(longest, parts[-1])), True
+        same_stem = self._by_stem.get(stem_key(parts[-1]), [])
+        in_folder = [one for one in same_stem if tuple(map(name_key, one[:-1])) == folder]
+        if in_folder or (folder and folder in self._folders):
+            return self._paths(_prefer(in_folder, parts[-1])), False
+        lengths = [_common_end(one[:-1], parts[:-1]) for one in same_stem]
+        longest = [one for one, length in zip(same_stem, lengths, strict=True) if length == max(lengths)]
+        return self._paths(_prefer(longest, parts[-1])), True
 
     def _paths(self, found: Sequence[tuple[str, ...]]) -> list[Path]:
         return [self._base.joinpath(*parts) for parts in found]
 
 
-def _preferred(found: list[tuple[str, ...]], name: str) -> list[tuple[str, ...]]:
-    """Of several files those of the name's extension, and of these those in no folder of masks or copies."""
+def _prefer(found: list[tuple[str, ...]], name: str) -> list[tuple[str, ...]]:
+    """Files with the name's extension if any, and of these the files in no folder of masks or copies."""
     extension = os.path.splitext(name)[1].lower()
-    for good in (
+    for is_preferred in (
         lambda parts: os.path.splitext(parts[-1])[1].lower() == extension,
-        lambda parts: not any(part.lower().startswith(_SECONDARY) for part in parts[:-1]),
+        lambda parts: not any(part.lower().startswith(_SECONDARY_FOLDER_PREFIXES) for part in parts[:-1]),
         lambda parts: parts[-1] == name,
     ):
-        some = [parts for parts in found if good(parts)]
-        found = some if some and len(found) > 1 else found
+        preferred = [parts for parts in found if is_preferred(parts)]
+        found = preferred if preferred and len(found) > 1 else found
     return found
 
 
 def _common_end(one: Sequence[str], other: Sequence[str]) -> int:
-    """How many last parts two paths share."""
+    """Number of last parts that two paths share."""
     count = 0
     for first, second in zip(reversed(one), reversed(other), strict=False):
         if name_key(first) != name_key(second):
@@ -203,12 +211,12 @@ def _common_end(one: Sequence[str], other: Sequence[str]) -> int:
     return count
 
 
-def picture_tree(base: Path) -> Iterator[tuple[str, ...]]:
-    """The parts of the paths of pictures below a folder, in order, without hidden ones."""
+def iterate_image_paths(base: Path) -> Iterator[tuple[str, ...]]:
+    """Parts of the paths of images below a folder, in order, without hidden ones."""
     for folder, folders, files in os.walk(base, followlinks=True):
         parts = Path(os.path.relpath(folder, base)).parts
         folders[:] = (
-            sorted(name for name in folders if not is_hidden([name])) if len(parts) < MAX_DEPTH else []
+            sorted(name for name in folders if not is_hidden([name])) if len(parts) < MAX_FOLDER_DEPTH else []
         )
         for name in sorted(files):
             if os.path.splitext(name)[1].lower() in EXTENSIONS and not is_hidden([name]):

@@ -15,28 +15,34 @@ import numpy.typing as npt
 from PIL import Image
 
 from cagefield.errors import DatasetError
-from cagefield.images.color_conversion import conversion_of, has_alpha, rgb_converter
-from cagefield.images.image_files import DAMAGED, load_whole, opened_picture, reason_of, tiles
+from cagefield.images.color_conversion import describe_conversion, has_alpha, rgb_converter
+from cagefield.images.image_files import (
+    DECODING_ERRORS,
+    error_reason,
+    iterate_tiles,
+    load_pixels,
+    open_image_file,
+)
 from cagefield.images.image_formats import EFFICIENT_FORMATS
 
 EXTENSIONS = (
     ".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff", ".heic", ".heif", ".hif", ".avif", ".exr",
 )  # fmt: skip
 FULL_SIZE_FOLDERS = ("images", "input", "photos", "rgb", "color", "image")
-"""Folders in which photos of the whole size are, the first that is there."""
+"""Names of folders of full-size photos, in order of preference."""
 
-LONGER_SIDE = 800  # pixels; what `downscale=None` brings the longer side down to, at most
+MAX_DEFAULT_SIDE_PIXELS = 800  # longer side with `downscale=None`
 
 
 @dataclass(frozen=True)
 class Header:
-    """What a photo file says before its pixels are read."""
+    """Properties of a photo file, read without its pixels."""
 
     width: int
     height: int
     alpha: bool
     conversion: str | None = None
-    """Conversion of its pixels, as of `color_conversion.conversion_of`."""
+    """Conversion of its pixels, as `color_conversion.describe_conversion` names it; None for none."""
 
 
 def find_photo(path: Path) -> Path | None:
@@ -52,12 +58,12 @@ def find_photo(path: Path) -> Path | None:
 
 
 def read_header(path: Path) -> Header:
-    """Size of the photo, whether it has an alpha channel, and how its colors are converted.
+    """Size of the photo, whether it has an alpha channel, and the conversion of its colors.
 
     Raises DatasetError where it is no image.
     """
-    with _opened(path) as image:
-        return Header(image.width, image.height, has_alpha(image), conversion_of(image))
+    with _open_photo(path) as image:
+        return Header(image.width, image.height, has_alpha(image), describe_conversion(image))
 
 
 def is_cut_out(path: Path) -> bool:
@@ -66,7 +72,7 @@ def is_cut_out(path: Path) -> bool:
 
 
 def report_conversions(where: Path, photos: Iterable[Path]) -> None:
-    """Warns once for each way in which photos are converted, with their number.
+    """Warn once for each kind of color conversion, with the number of its photos.
 
     Raises DatasetError where a photo is no image.
     """
@@ -78,12 +84,12 @@ def report_conversions(where: Path, photos: Iterable[Path]) -> None:
 def read_photo(path: Path, factor: int = 1) -> npt.NDArray[np.uint8]:
     """Pixels uint8 [H,W,3], or [H,W,4] with straight alpha: means of `factor` x `factor` pixels of the file.
 
-    Columns and rows left over at the right and bottom are dropped. With alpha, colours are averaged
+    Columns and rows left over at the right and bottom are dropped. With alpha, colors are averaged
     premultiplied. Pixels are as stored: EXIF orientation is not applied, since poses refer to stored pixels.
 
     Raises DatasetError where the file cannot be read.
     """
-    with _opened(path) as image:
+    with _open_photo(path) as image:
         convert = rgb_converter(image)
         width, height = image.width // factor, image.height // factor
         if min(width, height) < 1:
@@ -92,18 +98,23 @@ def read_photo(path: Path, factor: int = 1) -> npt.NDArray[np.uint8]:
             )
         pixels = np.empty((height, width, 4 if has_alpha(image) else 3), np.uint8)
         try:
-            load_whole(image)
-            for box in tiles(width * factor, height * factor, factor):
+            load_pixels(image)
+            for box in iterate_tiles(width * factor, height * factor, factor):
                 x, y, end_x, end_y = (side // factor for side in box)
                 pixels[y:end_y, x:end_x] = _shrunk(convert(image.crop(box)), factor)
-        except DAMAGED as error:
+        except DECODING_ERRORS as error:
             cure = "convert it to JPEG" if image.format in EFFICIENT_FORMATS else "replace the file"
-            raise DatasetError(f"{path}: the image cannot be decoded ({reason_of(error)}); {cure}") from error
+            raise DatasetError(
+                f"{path}: the image cannot be decoded ({error_reason(error)}); {cure}"
+            ) from error
     return pixels
 
 
 def _shrunk(pixels: Image.Image, factor: int) -> npt.NDArray[np.uint8]:
-    """Means of a part of a photo, whose sides are multiples of `factor`: 40 bytes for each of its pixels."""
+    """Means of `factor` x `factor` pixels of a part of a photo, whose sides are multiples of `factor`.
+
+    Memory: 40 bytes for each pixel of the part.
+    """
     if factor == 1:
         return np.asarray(pixels)
     if pixels.mode == "RGB":
@@ -117,9 +128,9 @@ def _shrunk(pixels: Image.Image, factor: int) -> npt.NDArray[np.uint8]:
 
 
 def photo_folders(root: Path, whole: str = "") -> dict[int, Path]:
-    """The photo folders that `root` has, by factor: {1: images, 2: images_2, 4: images_4, ...}.
+    """Photo folders in `root` by factor: {1: images, 2: images_2, 4: images_4, ...}.
 
-    Photos of the whole size are in the folder `whole`, or in the first of FULL_SIZE_FOLDERS that is there.
+    Full-size photos are in the folder `whole`, or in the first of FULL_SIZE_FOLDERS that exists.
     """
     found = [name for name in ((whole,) if whole else FULL_SIZE_FOLDERS) if (root / name).is_dir()]
     folders = {1: root / found[0]} if found else {}
@@ -130,7 +141,7 @@ def photo_folders(root: Path, whole: str = "") -> dict[int, Path]:
 
 
 def choose_downscale(longer_side: int, downscale: int | None, stored: dict[int, Path] | None = None) -> int:
-    """The factor to shrink by: `downscale`, or the least power of two that leaves at most 800 pixels a side.
+    """Factor to shrink by: `downscale`, or the least power of two that leaves at most 800 pixels a side.
 
     `stored` are the factors at which photos exist on disk (see `photo_folders`): the result is a multiple of
     one.
@@ -140,7 +151,7 @@ def choose_downscale(longer_side: int, downscale: int | None, stored: dict[int, 
     factors = sorted(stored) if stored else [1]
     if downscale is None:
         factor = 1
-        while longer_side > LONGER_SIDE * factor or all(factor % f for f in factors):
+        while longer_side > MAX_DEFAULT_SIDE_PIXELS * factor or all(factor % f for f in factors):
             factor *= 2
             if factor > longer_side:
                 return factors[0]
@@ -148,22 +159,22 @@ def choose_downscale(longer_side: int, downscale: int | None, stored: dict[int, 
     if isinstance(downscale, bool) or int(downscale) != downscale or not 1 <= downscale <= longer_side:
         raise DatasetError(f"downscale must be a whole number from 1 to {longer_side}, got {downscale}")
     if all(downscale % f for f in factors):
-        have = ", ".join(folder.name for folder in (stored or {}).values())
+        names = ", ".join(folder.name for folder in (stored or {}).values())
         raise DatasetError(
-            f"downscale {downscale} cannot be made from the photos there are ({have}); use one of these"
+            f"downscale {downscale} cannot be made from the photos there are ({names}); use one of these"
         )
     return int(downscale)
 
 
 @contextlib.contextmanager
-def _opened(path: Path) -> Iterator[Image.Image]:
+def _open_photo(path: Path) -> Iterator[Image.Image]:
     with contextlib.ExitStack() as stack:
         try:
-            image = stack.enter_context(opened_picture(path))
+            image = stack.enter_context(open_image_file(path))
         except DatasetError:
             raise
-        except DAMAGED as error:
+        except DECODING_ERRORS as error:
             raise DatasetError(
-                f"{path}: not a readable image ({reason_of(error)}); replace the file or remove its frame"
+                f"{path}: not a readable image ({error_reason(error)}); replace the file or remove its frame"
             ) from error
         yield image

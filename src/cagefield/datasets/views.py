@@ -19,13 +19,13 @@ from cagefield.errors import DatasetError
 
 FloatArray = npt.NDArray[np.float64]
 
-MAX_NAMED = 100
-"""Files or frames that one warning names, at most."""
+MAX_NAMES_SHOWN = 100
+"""Maximum number of files or frames that one warning names."""
 
 
 @dataclass(frozen=True)
 class PhotoMask:
-    """A picture file that excludes pixels of a photo from features, training and figures.
+    """An image file that excludes pixels of a photo from features, training and figures.
 
     `excluded` "black": 8-bit values below 128 (nerfstudio's and COLMAP's convention); "white": every pixel
     that is not zero (Instant-NGP's dynamic masks).
@@ -37,7 +37,7 @@ class PhotoMask:
 
 @dataclass(frozen=True)
 class View:
-    """One posed photo: `camera` belongs to the image that `load` returns, shrunk by `downscale`.
+    """Posed photo: `camera` belongs to the image that `load` returns, shrunk by `downscale`.
 
     Where `source` is given the photo has another lens than the camera: it is resampled at load.
     """
@@ -57,7 +57,7 @@ class View:
         """
         pixels = read_photo(self.image_path, self.downscale)
         if self.source is not None:
-            return self.source.resampled(pixels, self.camera, self._shrunk_size())
+            return self.source.resample(pixels, self.camera, self._shrunk_size())
         if pixels.shape[:2] != (self.camera.height, self.camera.width):
             raise DatasetError(
                 f"{self.image_path}: {pixels.shape[1]}x{pixels.shape[0]} pixels after shrinking by "
@@ -66,12 +66,11 @@ class View:
         return pixels
 
     def valid_pixels(self) -> npt.NDArray[np.bool_] | None:
-        """Pixels [H,W] of `load` that may be used, True; None where all of them may.
+        """Valid pixels [H,W] of the image of `load`; None where all pixels are valid.
 
         A mask of another size than the photo is resampled by nearest neighbors; a shrunk pixel is valid where
-        all pixels of the photo in it are, so that no excluded color is in its mean.
-
-        Of a resampled photo those pixels are valid whose nearest one in the photo is.
+        all pixels of the photo in it are, so that no excluded color is in its mean. In a resampled photo a
+        pixel is valid where its nearest pixel of the photo is.
 
         Raises DatasetError where the mask cannot be read or has another aspect than the photo.
         """
@@ -82,15 +81,15 @@ class View:
             valid = resample_mask(valid, header.width, header.height, self.mask.path)
             valid = shrink_mask(valid, self.downscale)
         if self.source is not None:
-            valid = self.source.resampled_mask(valid, self.camera, self._shrunk_size())
+            valid = self.source.resample_mask(valid, self.camera, self._shrunk_size())
         return None if valid is None or valid.all() else valid
 
     def downscaled(self, factor: int) -> View:
-        """The same photo shrunk by a further `factor`."""
+        """View of the photo shrunk by a further `factor`."""
         return replace(self, camera=self.camera.downscaled(factor), downscale=self.downscale * factor)
 
     def whole(self) -> View:
-        """View of the whole photo, not shrunk: all pixels of its file, and their camera.
+        """View of the photo at full size: all pixels of its file, and their camera.
 
         Raises DatasetError where the file cannot be read.
         """
@@ -107,7 +106,9 @@ class View:
         return replace(self, camera=full, downscale=1)
 
     def _shrunk_size(self) -> tuple[float, float]:
-        """Width and height of the whole photo in shrunk pixels: no whole numbers where some are left over."""
+        """Width and height of the whole photo in shrunk pixels: fractions where rows or columns are left
+        over.
+        """
         header = read_header(self.image_path)
         return header.width / self.downscale, header.height / self.downscale
 
@@ -118,12 +119,12 @@ def _identity() -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class SparsePoints:
-    """Points of a reconstruction, in the data set's world, and the photos that see each of them.
+    """Sparse points of a reconstruction, in the data set's world, and the photos that see each of them.
 
     Attributes:
         positions: [M,3] float64, world units.
         rgb: [M,3] uint8.
-        seen_by: for each point the names of the views (`View.name`) that see it; empty where nobody says so.
+        seen_by: for each point the names of the views (`View.name`) that see it; empty where unknown.
         errors: [M] float32, mean reprojection error in pixels of the full-size photos; NaN where unknown.
     """
 
@@ -155,7 +156,7 @@ class SparsePoints:
             object.__setattr__(self, name, array)
 
     def take(self, rows: npt.NDArray[Any]) -> SparsePoints:
-        """The points of these rows, or where a mask is True."""
+        """Points of these rows, or of the rows where a mask is True."""
         index = np.arange(len(self))[rows]
         return SparsePoints(
             self.positions[index],
@@ -167,16 +168,16 @@ class SparsePoints:
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
-    """A capture: posed photos for training, testing and validation, and the region of space worth modelling.
+    """Capture: posed photos for training, testing and validation, and the modeled region of space.
 
     `bounds` [2,3] (min, max in world units) is the box that holds the whole scene, or, where `unbounded`, the
     cube of interest: the inner box of a contraction. `white_background` says that the photos are cut-outs
     (RGBA), composited on white by convention. `source_to_world` [4,4] maps the coordinates of the
-    reconstruction that the files came from to this data set's world: the levelling rotation for LLFF and
+    reconstruction that the files came from to this data set's world: the leveling rotation for LLFF and
     COLMAP, nerfstudio's `applied_transform` (already in the poses of its files), else the identity. `depths`
-    are the nearest and the farthest depth of content along the cameras' axes, where the reconstruction knows.
-    `points` are the reconstruction's, None where it has none. `offset` is what was taken off the file's
-    coordinates because they are far from the origin (see `far_origin`); `source_to_world` has it too.
+    are the nearest and the farthest depth of content along the cameras' axes, None where unknown. `points`
+    are the reconstruction's, None where it has none. `offset` is the vector subtracted from the file's
+    coordinates where these are far from the origin (see `far_origin`); `source_to_world` includes it.
     """
 
     name: str
@@ -208,13 +209,14 @@ class Dataset:
 
 
 def check_holdout(every: int) -> None:
-    """Passes 0 and whole numbers from 2. Raises DatasetError for anything else."""
+    """Accept 0 and whole numbers from 2. Raises DatasetError for anything else."""
     if isinstance(every, bool) or int(every) != every or every < 0 or every == 1:
         raise DatasetError(f"holdout must be 0 (no test views) or a whole number from 2, got {every}")
 
 
 def hold_out(views: Sequence[View], every: int) -> tuple[tuple[View, ...], tuple[View, ...]]:
-    """Training and test views: sorted by name, the first photo and each `every`-th after it test; 0 is none.
+    """(training views, test views): sorted by name, the first photo and each `every`-th after it test; 0 is
+    none.
 
     All views of a photo (a panorama's faces) are held out together. A single photo trains.
     """
@@ -222,39 +224,44 @@ def hold_out(views: Sequence[View], every: int) -> tuple[tuple[View, ...], tuple
     number = {photo: i for i, photo in enumerate(dict.fromkeys(view.image_path for view in ordered))}
     if every == 0 or len(number) == 1:
         return tuple(ordered), ()
-    tested = [number[view.image_path] % every == 0 for view in ordered]
-    parts = list(zip(ordered, tested, strict=True))
+    is_test = [number[view.image_path] % every == 0 for view in ordered]
+    parts = list(zip(ordered, is_test, strict=True))
     return tuple(v for v, test in parts if not test), tuple(v for v, test in parts if test)
 
 
-def named(names: Sequence[str]) -> str:
-    """Names in a row, at most MAX_NAMED of them."""
-    more = f" and {len(names) - MAX_NAMED} more" if len(names) > MAX_NAMED else ""
-    return ", ".join(names[:MAX_NAMED]) + more
+def join_names(names: Sequence[str]) -> str:
+    """Comma-separated names, at most MAX_NAMES_SHOWN of them."""
+    more = f" and {len(names) - MAX_NAMES_SHOWN} more" if len(names) > MAX_NAMES_SHOWN else ""
+    return ", ".join(names[:MAX_NAMES_SHOWN]) + more
 
 
 def report_missing(path: Path, missing: Sequence[str], total: int) -> None:
-    """Warns once, by count and name, of frames whose photo is missing.
+    """Warn once, by count and name, of frames whose photo is missing.
 
-    Raises DatasetError where none is left.
+    Raises DatasetError where no frame is left.
     """
     if not missing:
         return
     if len(missing) == total:
         raise DatasetError(
             f"{path}: none of the photos of its {total} frames is there; put them where "
-            f"the file says: {named(missing)}"
+            f"the file says: {join_names(missing)}"
         )
-    warn(f"{path}: {len(missing)} of {total} frames are left out, their photos are missing: {named(missing)}")
+    warn(
+        f"{path}: {len(missing)} of {total} frames are left out, their photos are missing: "
+        f"{join_names(missing)}"
+    )
 
 
 def report_unposed(path: Path, names: Sequence[str], total: int) -> None:
-    """Warns once, by count and name, of frames without a pose or with one that is not finite.
+    """Warn once, by count and name, of frames without a pose or with one that is not finite.
 
-    Raises DatasetError where none is left.
+    Raises DatasetError where no frame is left.
     """
     if not names:
         return
     if len(names) == total:
         raise DatasetError(f"{path}: none of its {total} frames has a finite pose; find the poses again")
-    warn(f"{path}: {len(names)} of {total} frames are left out, they have no finite pose: {named(names)}")
+    warn(
+        f"{path}: {len(names)} of {total} frames are left out, they have no finite pose: {join_names(names)}"
+    )

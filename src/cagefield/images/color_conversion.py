@@ -1,4 +1,4 @@
-"""Pictures of any mode as 8-bit sRGB: depth, linear light, color profiles, palettes.
+"""Images of any mode as 8-bit sRGB: depth, linear light, color profiles, palettes.
 
 16 bits a channel are divided by 257, floats are linear light and get the sRGB transfer function, clipped at
 1; colors with another profile than sRGB are converted by it. Pillow reads 16-bit RGB by its upper bytes.
@@ -19,7 +19,9 @@ from PIL import Image, ImageCms
 
 from cagefield.typing import UInt8
 
-_SAME_COLORS = 2  # levels by which a profile's colors may differ from sRGB's, and be called the same
+_MAX_COLOR_DIFFERENCE_LEVELS = (
+    2  # levels by which a profile's colors may differ from sRGB's, and be called the same
+)
 _MAX_PROFILE_BYTES = 4 << 20
 _PROFILE_SPACES = {"RGB": "RGB ", "RGBA": "RGB ", "L": "GRAY", "CMYK": "CMYK"}
 
@@ -27,36 +29,36 @@ Convert = Callable[[Image.Image], Image.Image]
 
 
 def has_alpha(image: Image.Image) -> bool:
-    """Whether a picture has an alpha channel or a transparent color, which `rgb_converter` keeps."""
+    """Whether an image has an alpha channel or a transparent color, which `rgb_converter` keeps."""
     if image.mode in ("I", "F") or image.mode.startswith("I;16"):
         return False
     return image.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in image.info
 
 
-def conversion_of(image: Image.Image) -> str | None:
-    """Loss by reading a picture as 8-bit sRGB, in words; None for nothing.
+def describe_conversion(image: Image.Image) -> str | None:
+    """Loss by reading an image as 8-bit sRGB, in words; None for no loss.
 
-    The picture's pixels must not have been loaded yet.
+    The image's pixels must not have been loaded yet.
     """
     if image.format == "EXR" or image.mode == "F":
         return "in linear light, converted to 8-bit sRGB and clipped at 1"
-    bits = _bits(image)
+    bits = _bits_per_channel(image)
     if bits > 8:
         return f"of {bits} bits a channel, converted to 8"
-    profile = _profile_of(image)
+    profile = _profile_conversion(image)
     if profile is not None:
         return f"with the color profile {profile[1]}, converted to sRGB"
     return None
 
 
 def rgb_converter(image: Image.Image) -> Convert:
-    """The function that turns parts of a picture into "RGB", or "RGBA" where `has_alpha`."""
+    """Function that converts parts of an image to "RGB", or "RGBA" where `has_alpha`."""
     mode = "RGBA" if has_alpha(image) else "RGB"
     if image.mode == "F":
         return lambda part: Image.fromarray(srgb_bytes(np.asarray(part))).convert(mode)
     if image.mode == "I" or image.mode.startswith("I;16"):
         return lambda part: _from_16_bits(part).convert(mode)
-    found = _profile_of(image)
+    found = _profile_conversion(image)
     if found is None:
         return lambda part: part.convert(mode)
     transform, source = found[0], _profiled_mode(image)
@@ -70,7 +72,7 @@ def rgb_converter(image: Image.Image) -> Convert:
 
 
 def srgb_bytes(linear: ArrayLike) -> UInt8:
-    """8-bit sRGB of linear light, of which 1 is white; NaN and what is negative is black."""
+    """8-bit sRGB of linear light, where 1 is white; NaN and negative values are black."""
     light = np.asarray(linear, np.float32)
     light = np.minimum(np.where(light > 0, light, np.float32(0)), np.float32(1))
     encoded = np.where(
@@ -84,8 +86,8 @@ def _from_16_bits(part: Image.Image) -> Image.Image:
     return Image.fromarray((values / 257.0 + 0.5).astype(np.uint8))
 
 
-def _bits(image: Image.Image) -> int:
-    """Bits a channel in the file, as far as they are known; 8 else."""
+def _bits_per_channel(image: Image.Image) -> int:
+    """Bits a channel in the file, as far as they are known; else 8."""
     if image.mode == "I" or image.mode.startswith("I;16"):
         return 16
     depth = image.info.get("bit_depth")
@@ -98,7 +100,7 @@ def _bits(image: Image.Image) -> int:
 
 
 def _profiled_mode(image: Image.Image) -> str:
-    """The mode in which a picture's color profile is applied."""
+    """Mode in which an image's color profile is applied."""
     if image.mode == "CMYK":
         return "CMYK"
     if image.mode == "L" and not has_alpha(image):
@@ -106,10 +108,10 @@ def _profiled_mode(image: Image.Image) -> str:
     return "RGBA" if has_alpha(image) else "RGB"
 
 
-def _profile_of(image: Image.Image) -> tuple[ImageCms.ImageCmsTransform, str] | None:
-    """Conversion of a picture's colors to sRGB, and the name of its profile; None where they are sRGB.
+def _profile_conversion(image: Image.Image) -> tuple[ImageCms.ImageCmsTransform, str] | None:
+    """(conversion of an image's colors to sRGB, name of its profile); None where they are sRGB.
 
-    Profiles that cannot be read, or of another kind of color than the picture's, are none.
+    Profiles that cannot be read, or of another kind of color than the image's, are ignored.
     """
     content = image.info.get("icc_profile")
     if image.mode == "F" or not isinstance(content, bytes) or not 0 < len(content) <= _MAX_PROFILE_BYTES:
@@ -139,11 +141,11 @@ def _transform(content: bytes, mode: str) -> tuple[ImageCms.ImageCmsTransform, s
     if converted is None:
         return None
     difference = np.asarray(converted.convert("RGB"), int) - np.asarray(probe.convert("RGB"), int)
-    return None if np.abs(difference).max() <= _SAME_COLORS else (transform, name)
+    return None if np.abs(difference).max() <= _MAX_COLOR_DIFFERENCE_LEVELS else (transform, name)
 
 
 def _probe(mode: str) -> Image.Image:
-    """A picture of colors from all over the cube; of grays in mode "L"."""
+    """Image of colors from all over the cube; of grays in mode "L"."""
     levels = np.arange(0, 256, 51, dtype=np.uint8)
     if mode == "L":
         return Image.fromarray(levels[None])

@@ -1,4 +1,4 @@
-"""OpenEXR pictures as 8-bit sRGB: linear light, clipped at 1, with straight alpha.
+"""OpenEXR images as 8-bit sRGB: linear light, clipped at 1, with straight alpha.
 
 Channels R, G, B [, A], or Y [, A], of the first part that has them; colors are premultiplied by alpha in the
 file (OpenEXR, "Technical Introduction"). Pixels of the data window lie in the display window.
@@ -22,29 +22,29 @@ from cagefield.errors import DatasetError
 from cagefield.images.color_conversion import srgb_bytes
 from cagefield.typing import UInt8
 
-_MAX_SAMPLES = 400 << 20  # of all the channels of all the parts, which are decoded at once
-_LARGEST_COORDINATE = 1 << 24
+_MAX_CHANNEL_SAMPLES = 400 << 20  # of all the channels of all the parts, which are decoded at once
+_MAX_COORDINATE_PIXELS = 1 << 24
 
-_SILENCE = threading.Lock()
+_OUTPUT_LOCK = threading.Lock()
 
 Window = tuple[int, int, int, int]
 
 
-class ExrPicture(ImageFile.ImageFile):
-    """An OpenEXR file, whose pixels are decoded when they are asked for."""
+class ExrImage(ImageFile.ImageFile):
+    """OpenEXR file whose pixels are decoded on demand."""
 
     format = "EXR"
     format_description = "OpenEXR"
 
     def _open(self) -> None:
         self._path = Path(str(self.filename))
-        header, self._part, self._names = _described(_read(self._path, header_only=True), self._path)
+        header, self._part, self._names = _select_part(_read(self._path, header_only=True), self._path)
         left, top, right, bottom = _window(header, "displayWindow")
         self._size = (right - left, bottom - top)
         self._mode = "RGBA" if "A" in self._names else "RGB"
 
     def load(self) -> Any:
-        """Decodes the pixels once. Raises ValueError where they are not what the header says."""
+        """Decode the pixels once. Raises ValueError where they differ from the header."""
         if self._im is None:
             file = _read(self._path, header_only=False)
             part = file.parts[self._part]
@@ -60,16 +60,16 @@ def _read(path: Path, header_only: bool) -> Any:
             f"{path}: EXR photos need OpenEXR; pip install 'cagefield[exr]', or convert them to 16-bit PNG"
         ) from None
     try:
-        with _SILENCE, _silenced():
+        with _OUTPUT_LOCK, _discard_output():
             return OpenEXR.File(str(path), separate_channels=True, header_only=header_only, num_threads=1)
     except Exception as error:  # whatever C++ threw
         raise ValueError(f"OpenEXR: {' '.join(str(error).split())[:160]}") from None
 
 
 @contextlib.contextmanager
-def _silenced() -> Iterator[None]:
-    """Discards what OpenEXR writes of damaged files to Python's output and, from C++, to the process's."""
-    kept = [os.dup(number) for number in (1, 2)]
+def _discard_output() -> Iterator[None]:
+    """Discard OpenEXR's messages about damaged files, on Python's output and, from C++, the process's."""
+    saved = [os.dup(number) for number in (1, 2)]
     try:
         with open(os.devnull, "wb") as nowhere:
             for number in (1, 2):
@@ -79,34 +79,36 @@ def _silenced() -> Iterator[None]:
     finally:
         with contextlib.suppress(OSError, AttributeError):
             ctypes.CDLL(None).fflush(None)
-        for number, copy in zip((1, 2), kept, strict=True):
+        for number, copy in zip((1, 2), saved, strict=True):
             os.dup2(copy, number)
             os.close(copy)
 
 
-def _described(file: Any, path: Path) -> tuple[Mapping[str, Any], int, dict[str, str]]:
-    """Header and index of the part to show, and its channels' names by R, G, B, A, or Y, A."""
+def _select_part(file: Any, path: Path) -> tuple[Mapping[str, Any], int, dict[str, str]]:
+    """(header, index, channel names by R, G, B, A, or Y, A) of the first part with colors."""
     samples = 0
     chosen: tuple[Mapping[str, Any], int, dict[str, str]] | None = None
-    others: list[str] = []
+    other_names: list[str] = []
     for index, part in enumerate(file.parts):
         header = part.header
         left, top, right, bottom = _window(header, "dataWindow")
         names = [str(channel.name) for channel in header.get("channels", ())]
         samples += len(names) * (right - left) * (bottom - top)
-        wanted = _color_channels(names)
-        if wanted and chosen is None:
-            chosen = header, index, wanted
-        others += names
-    if samples > _MAX_SAMPLES:
-        raise ValueError(f"{samples} samples in all channels, at most {_MAX_SAMPLES} are read; shrink it")
+        color_channels = _color_channels(names)
+        if color_channels and chosen is None:
+            chosen = header, index, color_channels
+        other_names += names
+    if samples > _MAX_CHANNEL_SAMPLES:
+        raise ValueError(
+            f"{samples} samples in all channels, at most {_MAX_CHANNEL_SAMPLES} are read; shrink it"
+        )
     if chosen is None:
-        raise ValueError(f"no channels R, G, B or Y, only {', '.join(others)[:120] or 'none'}")
+        raise ValueError(f"no channels R, G, B or Y, only {', '.join(other_names)[:120] or 'none'}")
     return chosen
 
 
 def _color_channels(names: list[str]) -> dict[str, str]:
-    """Channels of the layer without a name; else of the first layer that has colors; else none."""
+    """Channel names of the layer without a name; else of the first layer that has colors; else none."""
     layers = sorted({name.rpartition(".")[0] for name in names}, key=lambda layer: (layer != "", layer))
     for layer in layers:
         prefix = f"{layer}." if layer else ""
@@ -120,15 +122,17 @@ def _color_channels(names: list[str]) -> dict[str, str]:
 
 
 def _window(header: Mapping[str, Any], key: str) -> Window:
-    """Left, top, right and bottom of a window, the last two outside. Raises ValueError for an empty one."""
+    """(left, top, right, bottom) of a window, the last two exclusive. Raises ValueError for an empty
+    window.
+    """
     (left, top), (right, bottom) = ((int(side) for side in corner) for corner in header[key])
-    if max(map(abs, (left, top, right, bottom))) > _LARGEST_COORDINATE or right < left or bottom < top:
+    if max(map(abs, (left, top, right, bottom))) > _MAX_COORDINATE_PIXELS or right < left or bottom < top:
         raise ValueError(f"its {key} is ({left}, {top}) to ({right}, {bottom}); it is damaged")
     return left, top, right + 1, bottom + 1
 
 
 def _pixels(part: Any, names: Mapping[str, str], size: tuple[int, int]) -> UInt8:
-    """uint8 [H,W,3|4] of the display window; black, or transparent, outside the data window."""
+    """Pixels uint8 [H,W,3|4] of the display window; black, or transparent, outside the data window."""
     window = _window(part.header, "displayWindow")
     data = _window(part.header, "dataWindow")
     width, height = size

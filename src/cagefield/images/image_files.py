@@ -1,4 +1,4 @@
-"""Pictures and videos in and out; a file appears whole or not at all."""
+"""Reading and writing of image and video files; a file appears whole or not at all."""
 
 from __future__ import annotations
 
@@ -20,86 +20,89 @@ from cagefield.files.safe_open import check_regular
 from cagefield.images.color_conversion import has_alpha, rgb_converter
 from cagefield.images.image_formats import (
     EFFICIENT_FORMATS,
-    open_picture,
-    orientation_is_pixels,
-    turned_as_stored,
+    apply_rotation,
+    needs_rotation,
+    open_decoder,
 )
 from cagefield.images.render_result import to_uint8
-from cagefield.images.video import encoder
+from cagefield.images.video import open_encoder
 from cagefield.typing import UInt8
 
-MAX_PIXELS = 100 << 20
-"""Pixels of a picture that is read: a file of kilobytes may have any number of them."""
+MAX_IMAGE_PIXELS = 100 << 20
+"""Maximum pixels of an image that is read: a file of kilobytes may have any number of them."""
 
-MOST_BYTES = 1 << 30
-"""Bytes of a picture's file that is read: some decoders take all of it into memory."""
+MAX_FILE_BYTES = 1 << 30
+"""Maximum bytes of an image file that is read: some decoders take all of it into memory."""
 
-_DENSEST, _ALWAYS = 1100, 1 << 18
-"""Pixels for each byte of a file, at most: deflate's best of 8 bits a pixel; 512 x 512 are always read."""
+_MAX_PIXELS_PER_BYTE, _ALWAYS_READ_PIXELS = 1100, 1 << 18
+"""Maximum pixels per byte of a file (deflate's best of 8 bits a pixel); fewer pixels are always accepted."""
 
-_DENSEST_EFFICIENT = 16 * _DENSEST
-"""Pixels for each byte of HEIF and AVIF, at most: flat blocks of 64 x 64 pixels take a fraction of a bit."""
+_MAX_EFFICIENT_PIXELS_PER_BYTE = 16 * _MAX_PIXELS_PER_BYTE
+"""Maximum pixels per byte of HEIF and AVIF: flat blocks of 64 x 64 pixels take a fraction of a bit."""
 
-_TILE = 1 << 16
+_TILE_PIXELS = 1 << 16
 
-DAMAGED = (
+DECODING_ERRORS = (
     OSError, SyntaxError, ValueError, LookupError, TypeError, AttributeError, OverflowError, EOFError,
     RuntimeError, ZeroDivisionError, struct.error, zlib.error, Image.DecompressionBombError,
 )  # fmt: skip
-"""What pillow raises of damaged pictures."""
+"""Exceptions that Pillow raises for damaged images."""
 
 
-def reason_of(error: Exception) -> str:
-    """A decoder's reason as one line of at most 200 characters."""
+def error_reason(error: Exception) -> str:
+    """Reason of a decoder's error as one line of at most 200 characters."""
     return " ".join(str(error).split())[:200]
 
 
 def check_pixels(image: Image.Image, size: int | None = None) -> None:
-    """Passes where an opened picture, of which only the header is read, has at most MAX_PIXELS.
+    """Accept an opened image, of which only the header is read, of at most MAX_IMAGE_PIXELS.
 
-    `size` bytes of its file can hold so many, too. Raises ValueError.
+    Its pixels must be possible in a file of `size` bytes, too. Raises ValueError.
     """
     count = image.width * image.height
-    if count > MAX_PIXELS:
+    if count > MAX_IMAGE_PIXELS:
         raise ValueError(
-            f"{image.width} x {image.height} pixels, at most {MAX_PIXELS >> 20} million are read; shrink it"
+            f"{image.width} x {image.height} pixels, at most {MAX_IMAGE_PIXELS >> 20} million are read; "
+            f"shrink it"
         )
-    densest = _DENSEST_EFFICIENT if image.format in EFFICIENT_FORMATS else _DENSEST
-    if size is not None and count > max(_ALWAYS, densest * size):
+    max_pixels_per_byte = (
+        _MAX_EFFICIENT_PIXELS_PER_BYTE if image.format in EFFICIENT_FORMATS else _MAX_PIXELS_PER_BYTE
+    )
+    if size is not None and count > max(_ALWAYS_READ_PIXELS, max_pixels_per_byte * size):
         raise ValueError(f"{image.width} x {image.height} pixels in {size} bytes; it is damaged or cut off")
 
 
 @contextmanager
-def opened_picture(path: Path) -> Iterator[Image.Image]:
-    """The picture in a file, of which the header is read, and at most MAX_PIXELS can be.
+def open_image_file(path: Path) -> Iterator[Image.Image]:
+    """Image of a file, of which the header is read, with at most MAX_IMAGE_PIXELS.
 
     Pixels are as stored: EXIF's orientation is not applied, the rotation of HEIF and AVIF is.
 
-    Raises ValueError for more, what DAMAGED lists for a file that is no picture, and DatasetError for one
-    whose decoder is not installed.
+    Raises ValueError for more pixels, DECODING_ERRORS for a file that is no image, and DatasetError for an
+    image whose decoder is not installed.
     """
-    check_regular(path, MOST_BYTES)
-    with path.open("rb") as file, open_picture(file) as image:
+    check_regular(path, MAX_FILE_BYTES)
+    with path.open("rb") as file, open_decoder(file) as image:
         check_pixels(image, path.stat().st_size)
-        yield turned_as_stored(image) if orientation_is_pixels(image) else image
+        yield apply_rotation(image) if needs_rotation(image) else image
 
 
-def load_whole(image: Image.Image) -> None:
-    """Decodes an opened picture. Raises what DAMAGED lists, and ValueError for another size than it said."""
+def load_pixels(image: Image.Image) -> None:
+    """Decode an opened image. Raises DECODING_ERRORS, and ValueError where the size is not the header's."""
     said = image.size
     image.load()
     if image.size != said:
         raise ValueError(f"{image.size[0]} x {image.size[1]} pixels, its header says {said[0]} x {said[1]}")
 
 
-def tiles(width: int, height: int, multiple: int = 1) -> Iterator[tuple[int, int, int, int]]:
-    """Boxes (x, y, end x, end y) that cover a picture, of some ten thousand pixels each.
+def iterate_tiles(width: int, height: int, multiple: int = 1) -> Iterator[tuple[int, int, int, int]]:
+    """Boxes (x, y, end x, end y) that cover an image, of some ten thousand pixels each.
 
-    Pictures are converted by them: what that takes is no more for large ones. Their sides are multiples of
-    `multiple`, but for those at the right and at the bottom.
+    Images are converted tile by tile, so that large ones take no more memory. The sides of tiles are
+    multiples of `multiple`, except at the right and at the bottom.
     """
-    across = max(multiple, _TILE // multiple // multiple * multiple)
-    down = max(multiple, _TILE // min(width, across) // multiple * multiple)
+    across = max(multiple, _TILE_PIXELS // multiple // multiple * multiple)
+    down = max(multiple, _TILE_PIXELS // min(width, across) // multiple * multiple)
     for y in range(0, height, down):
         for x in range(0, width, across):
             yield x, y, min(x + across, width), min(y + down, height)
@@ -110,15 +113,15 @@ def read_image(path: str | os.PathLike[str]) -> UInt8:
 
     Files of other depths, modes and color profiles are converted (see `color_conversion`); pixels come as
     stored, EXIF orientation is not applied (camera poses refer to the stored pixels). Raises DatasetError for
-    a file that is missing or no picture.
+    a file that is missing or no image.
     """
     path = Path(path)
     try:
-        with opened_picture(path) as image:
+        with open_image_file(path) as image:
             convert = rgb_converter(image)
-            load_whole(image)
+            load_pixels(image)
             pixels = np.empty((image.height, image.width, 4 if has_alpha(image) else 3), np.uint8)
-            for box in tiles(image.width, image.height):
+            for box in iterate_tiles(image.width, image.height):
                 x, y, end_x, end_y = box
                 pixels[y:end_y, x:end_x] = np.asarray(convert(image.crop(box)))
             return pixels
@@ -126,12 +129,12 @@ def read_image(path: str | os.PathLike[str]) -> UInt8:
         raise DatasetError(f"{path}: there is no such image") from error
     except DatasetError:
         raise
-    except DAMAGED as error:
-        raise DatasetError(f"{path}: not a readable image ({reason_of(error)})") from error
+    except DECODING_ERRORS as error:
+        raise DatasetError(f"{path}: not a readable image ({error_reason(error)})") from error
 
 
 def _pixels(image: NDArray[Any], channels: tuple[int, ...] = (1, 3, 4)) -> UInt8:
-    """uint8 [H,W] or [H,W,C] of a picture in uint8 or floats of [0,1]."""
+    """Pixels uint8 [H,W] or [H,W,C] of an image in uint8 or floats of [0,1]."""
     image = np.asarray(image)
     depth = 1 if image.ndim == 2 else image.shape[-1] if image.ndim == 3 else 0
     if depth not in channels or image.size == 0:
@@ -142,7 +145,7 @@ def _pixels(image: NDArray[Any], channels: tuple[int, ...] = (1, 3, 4)) -> UInt8
 
 
 def write_png(path: str | os.PathLike[str], image: NDArray[Any]) -> None:
-    """Writes uint8 or float [H,W], [H,W,1|3|4] as a PNG. Raises CagefieldError for other shapes, suffixes."""
+    """Write uint8 or float [H,W], [H,W,1|3|4] as a PNG. Raises CagefieldError for other shapes, suffixes."""
     path = Path(path)
     if path.suffix.lower() != ".png":
         raise CagefieldError(f"{path}: write_png writes .png files")
@@ -157,13 +160,13 @@ def write_png(path: str | os.PathLike[str], image: NDArray[Any]) -> None:
 def video_writer(
     path: str | os.PathLike[str], shape: tuple[int, int], fps: float = 24.0, *, quality: int = 18
 ) -> Iterator[Callable[[NDArray[Any]], None]]:
-    """A function that adds one RGB frame [H,W,3] (uint8 or float) of `shape` (H, W) to an H.264 file.
+    """Function that adds one RGB frame [H,W,3] (uint8 or float) of `shape` (H, W) to an H.264 file.
 
     The file is there once the context ends, and not at all where it ends with an error. Odd sizes are
     extended by repeating the last row or column: yuv420p, which every player shows, has even ones. `quality`
     is x264's CRF, 0 (lossless) to 51.
 
-    Raises CagefieldError for a suffix other than .mp4, and for frames of another size; OSError, that names
+    Raises CagefieldError for a suffix other than .mp4, and for frames of another size; OSError, which names
     the file, where it cannot be written.
     """
     path = Path(path)
@@ -176,7 +179,7 @@ def video_writer(
     count = 0
     with (
         replaced_file(path) as temporary,
-        encoder(temporary, (width + width % 2, height + height % 2), fps, quality) as encode,
+        open_encoder(temporary, (width + width % 2, height + height % 2), fps, quality) as encode,
     ):
 
         def add(frame: NDArray[Any]) -> None:
@@ -195,7 +198,7 @@ def video_writer(
 def write_video(
     path: str | os.PathLike[str], frames: Iterable[NDArray[Any]], fps: float = 24.0, *, quality: int = 18
 ) -> None:
-    """Writes RGB frames [H,W,3] (uint8 or float) as a video; see `video_writer`.
+    """Write RGB frames [H,W,3] (uint8 or float) as a video; see `video_writer`.
 
     Raises CagefieldError for no frames, frames of different sizes, or a suffix other than .mp4.
     """
@@ -211,7 +214,7 @@ def write_video(
 
 
 def side_by_side(*images: NDArray[Any], gap: int = 4) -> UInt8:
-    """RGB pictures [H,W,3] in one row, white between them and below shorter ones."""
+    """Image uint8 of RGB images [H,W,3] in one row, white between them and below shorter ones."""
     if not images:
         raise CagefieldError("side_by_side needs at least one image")
     columns = [_pixels(image, (3,)) for image in images]

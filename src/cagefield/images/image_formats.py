@@ -1,4 +1,4 @@
-"""Picture formats beside Pillow's own: HEIF (HEIC) through pi-heif, AVIF through Pillow, OpenEXR.
+"""Image formats beside Pillow's own: HEIF (HEIC) through pi-heif, AVIF through Pillow, OpenEXR.
 
 The first bytes of a file decide. The rotation and mirroring of a HEIF or AVIF file (`irot`, `imir`) are part
 of its pixels (ISO/IEC 23008-12, 6.5.10 and 6.5.12): they are always applied, and EXIF's copy of them is not.
@@ -21,30 +21,30 @@ EFFICIENT_FORMATS = ("HEIF", "AVIF")
 
 EXR_MAGIC = b"\x76\x2f\x31\x01"
 
-_FTYP_BYTES = 1 << 10  # of the box of brands that are looked at
-_ORIENTATION = 0x0112
+_BRAND_BOX_BYTES = 1 << 10  # of the box of brands that are looked at
+_ORIENTATION_TAG = 0x0112
 
 
-def brands(start: bytes) -> tuple[bytes, ...]:
-    """The major and compatible brands of an ISO media file that begins with these bytes; none of others."""
+def media_brands(start: bytes) -> tuple[bytes, ...]:
+    """Major and compatible brands of an ISO media file that begins with these bytes; none of other files."""
     if len(start) < 16 or start[4:8] != b"ftyp":
         return ()
     size = min(struct.unpack_from(">I", start)[0], len(start))
     return (start[8:12], *(start[i : i + 4] for i in range(16, size - 3, 4)))
 
 
-def open_picture(file: BinaryIO) -> Image.Image:
-    """The picture in an open file, of which the header is read.
+def open_decoder(file: BinaryIO) -> Image.Image:
+    """Image of an open file, of which the header is read.
 
-    Raises DatasetError where a decoder is not installed, and what Pillow and its decoders raise.
+    Raises DatasetError where a decoder is not installed, and the errors of Pillow and its decoders.
     """
-    start = file.read(_FTYP_BYTES)
+    start = file.read(_BRAND_BOX_BYTES)
     file.seek(0)
     if start[:4] == EXR_MAGIC:
-        from cagefield.images.exr import ExrPicture
+        from cagefield.images.exr import ExrImage
 
-        return ExrPicture(file, file.name)
-    found = brands(start)
+        return ExrImage(file, file.name)
+    found = media_brands(start)
     if any(brand in AVIF_BRANDS for brand in found):
         return _open_avif(file)
     if any(brand in HEIF_BRANDS for brand in found):
@@ -79,13 +79,13 @@ def _open_heif(file: BinaryIO) -> Image.Image:
     return picture
 
 
-def orientation_is_pixels(image: Image.Image) -> bool:
+def needs_rotation(image: Image.Image) -> bool:
     """Whether EXIF's orientation stands for a rotation that belongs to the pixels, and is not applied yet."""
-    return image.format == "AVIF" and image.getexif().get(_ORIENTATION, 1) != 1
+    return image.format == "AVIF" and image.getexif().get(_ORIENTATION_TAG, 1) != 1
 
 
-def turned_as_stored(image: Image.Image) -> Image.Image:
-    """A picture with its format's own rotation applied."""
+def apply_rotation(image: Image.Image) -> Image.Image:
+    """Image with its format's own rotation applied."""
     turned = ImageOps.exif_transpose(image)
     turned.format = image.format
     return turned

@@ -1,4 +1,4 @@
-"""Image differences as the NeRF literature reports them; images are uint8, or floats of [0,1]."""
+"""Image metrics of the NeRF literature; images are uint8, or floats of [0,1]."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from scipy.ndimage import binary_erosion, correlate1d
 from cagefield.errors import CagefieldError
 from cagefield.typing import AnyArray, Mask
 
-WINDOW, WINDOW_SIGMA = 11, 1.5
-K1, K2 = 0.01, 0.03
+SSIM_WINDOW_PIXELS, SSIM_SIGMA_PIXELS = 11, 1.5
+SSIM_K1, SSIM_K2 = 0.01, 0.03
 
-SATURATED = 0.5 / 255
+MAX_SATURATION_DISTANCE = 0.5 / 255
 """Distance from 0 and from 1 below which a color counts as saturated: half a step of 8 bits."""
 
-COLOR_FITS = 5
-"""Fits of a color correction at most, each without the pixels that the one before saturates."""
+MAX_COLOR_FITS = 5
+"""Maximum number of fits of a color correction, each without the pixels that the fit before saturates."""
 
 
 def _pair(first: AnyArray, second: AnyArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -33,7 +33,7 @@ def _pair(first: AnyArray, second: AnyArray) -> tuple[NDArray[np.float64], NDArr
 
 
 def _checked_mask(valid: Mask | None, shape: tuple[int, ...]) -> Mask | None:
-    """The mask [H,W], None where every pixel of images [H,W] or [H,W,C] is valid.
+    """Mask [H,W], None where every pixel of images [H,W] or [H,W,C] is valid.
 
     Raises CagefieldError for a mask of another size, and for one without a valid pixel.
     """
@@ -74,12 +74,15 @@ def ssim(first: AnyArray, second: AnyArray, valid: Mask | None = None) -> float:
     equations 13 to 16, and the authors' ssim_index.
     """
     a, b = _pair(first, second)
-    if a.ndim not in (2, 3) or min(a.shape[:2]) < WINDOW:
-        raise CagefieldError(f"ssim needs images of at least {WINDOW}x{WINDOW} pixels, not {list(a.shape)}")
-    offsets = np.arange(WINDOW) - WINDOW // 2
-    kernel = np.exp(-0.5 * (offsets / WINDOW_SIGMA) ** 2)
+    if a.ndim not in (2, 3) or min(a.shape[:2]) < SSIM_WINDOW_PIXELS:
+        raise CagefieldError(
+            f"ssim needs images of at least {SSIM_WINDOW_PIXELS}x{SSIM_WINDOW_PIXELS} pixels, not "
+            f"{list(a.shape)}"
+        )
+    offsets = np.arange(SSIM_WINDOW_PIXELS) - SSIM_WINDOW_PIXELS // 2
+    kernel = np.exp(-0.5 * (offsets / SSIM_SIGMA_PIXELS) ** 2)
     kernel /= kernel.sum()
-    edge = WINDOW // 2
+    edge = SSIM_WINDOW_PIXELS // 2
     valid = _checked_mask(valid, a.shape)
 
     def inner(image: NDArray[Any]) -> NDArray[Any]:
@@ -106,20 +109,20 @@ def ssim(first: AnyArray, second: AnyArray, valid: Mask | None = None) -> float:
     var_a = np.maximum(blur(a * a) - mean_a**2, 0.0)
     var_b = np.maximum(blur(b * b) - mean_b**2, 0.0)
     covariance = blur(a * b) - mean_a * mean_b
-    c1, c2 = K1**2, K2**2
+    c1, c2 = SSIM_K1**2, SSIM_K2**2
     luminance = (2 * mean_a * mean_b + c1) / (mean_a**2 + mean_b**2 + c1)
     structure = (2 * covariance + c2) / (var_a + var_b + c2)
     similarity = luminance * structure
     return float(np.mean(similarity if chosen is None else similarity[chosen]))
 
 
-def gradient_ratio(picture: AnyArray, photo: AnyArray, valid: Mask | None = None) -> float:
-    """Sharpness of a picture [H,W] or [H,W,C] against a photo: mean gradient over that of the photo.
+def gradient_ratio(image: AnyArray, photo: AnyArray, valid: Mask | None = None) -> float:
+    """Sharpness of an image [H,W] or [H,W,C] against a photo: mean gradient over that of the photo.
 
-    The gradient is that of the mean of the channels, by central differences; pixels beside excluded ones have
-    none. NaN where the photo has no gradient.
+    Gradients are central differences of the mean over channels; pixels beside excluded ones are left out. NaN
+    where the photo has no gradient.
     """
-    a, b = (image if image.ndim == 2 else image.mean(axis=-1) for image in _pair(picture, photo))
+    a, b = (pixels if pixels.ndim == 2 else pixels.mean(axis=-1) for pixels in _pair(image, photo))
     chosen = _checked_mask(valid, a.shape)
     inside: Any = slice(None) if chosen is None else binary_erosion(chosen, border_value=1)
     first, second = (float(np.hypot(*np.gradient(image))[inside].sum()) for image in (a, b))
@@ -133,21 +136,21 @@ class ColorFit:
     gain: NDArray[np.float64]
     offset: NDArray[np.float64]
 
-    def __call__(self, picture: AnyArray) -> NDArray[np.float32]:
-        """The corrected picture [H,W,C] in [0,1]."""
-        floats, _ = _pair(picture, picture)
+    def __call__(self, image: AnyArray) -> NDArray[np.float32]:
+        """Corrected image [H,W,C] in [0,1]."""
+        floats, _ = _pair(image, image)
         return np.clip(floats * self.gain + self.offset, 0, 1).astype(np.float32)
 
 
-def color_fit(picture: AnyArray, photo: AnyArray, valid: Mask | None = None) -> ColorFit:
-    """Least-squares affine map of each channel of a picture [H,W,C] to a photo.
+def color_fit(image: AnyArray, photo: AnyArray, valid: Mask | None = None) -> ColorFit:
+    """Least-squares affine map of each channel of an image [H,W,C] to a photo.
 
-    Over valid pixels that are saturated in neither, nor by the map itself, which is fitted again until its
-    saturated pixels stay the same (COLOR_FITS times at most). A channel of one value gets an offset alone,
-    one without such pixels stays as it is.
-    Source: `color_correct` of multinerf (evaluation of mip-NeRF 360), its quadratic terms left out.
+    The fit takes valid pixels that are saturated in neither image, nor by the map itself, and is repeated
+    until its saturated pixels stay the same (MAX_COLOR_FITS times at most). A channel of one value gets an
+    offset alone; one without such pixels is unchanged. Source: `color_correct` of multinerf (evaluation of
+    mip-NeRF 360), its quadratic terms left out.
     """
-    a, b = _pair(picture, photo)
+    a, b = _pair(image, photo)
     chosen = _checked_mask(valid, a.shape)
     a, b = (
         (a.reshape(-1, a.shape[-1]), b.reshape(-1, b.shape[-1])) if chosen is None else (a[chosen], b[chosen])
@@ -157,7 +160,7 @@ def color_fit(picture: AnyArray, photo: AnyArray, valid: Mask | None = None) -> 
         x, y = a[:, channel], b[:, channel]
         both = _unsaturated(x) & _unsaturated(y)
         used = both
-        for _ in range(COLOR_FITS):
+        for _ in range(MAX_COLOR_FITS):
             if not used.any():
                 break
             mean_x, mean_y = x[used].mean(), y[used].mean()
@@ -170,11 +173,11 @@ def color_fit(picture: AnyArray, photo: AnyArray, valid: Mask | None = None) -> 
     return ColorFit(gain, offset)
 
 
-def color_corrected(picture: AnyArray, photo: AnyArray, valid: Mask | None = None) -> NDArray[np.float32]:
-    """The picture [H,W,C] in the photo's colors: each channel by the affine map of `color_fit`."""
-    return color_fit(picture, photo, valid)(picture)
+def color_corrected(image: AnyArray, photo: AnyArray, valid: Mask | None = None) -> NDArray[np.float32]:
+    """Image [H,W,C] in the photo's colors: each channel by the affine map of `color_fit`."""
+    return color_fit(image, photo, valid)(image)
 
 
 def _unsaturated(values: NDArray[np.float64]) -> Mask:
-    inside: Mask = (values >= SATURATED) & (values <= 1 - SATURATED)
+    inside: Mask = (values >= MAX_SATURATION_DISTANCE) & (values <= 1 - MAX_SATURATION_DISTANCE)
     return inside

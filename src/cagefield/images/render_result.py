@@ -1,4 +1,4 @@
-"""What a renderer hands back: colour, opacity, depth and normals of one camera."""
+"""Result of rendering one camera: color, opacity, depth and normals."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from cagefield.typing import Float32
 
 Background = str | Sequence[float] | NDArray[Any] | None
 """Background of a rendered image: "white", "black", three numbers in [0,1], or None (also "none") for
-straight colour with opacity, nothing behind it. None has this meaning in every function and class."""
+straight color with opacity, nothing behind it. None has this meaning in every function and class."""
 
-_NAMED = {"white": (1.0, 1.0, 1.0), "black": (0.0, 0.0, 0.0)}
+_NAMED_BACKGROUNDS = {"white": (1.0, 1.0, 1.0), "black": (0.0, 0.0, 0.0)}
 
 
 def background_rgb(background: Background) -> tuple[float, float, float] | None:
@@ -28,11 +28,11 @@ def background_rgb(background: Background) -> tuple[float, float, float] | None:
     if background is None or (isinstance(background, str) and background == "none"):
         return None
     if isinstance(background, str):
-        if background not in _NAMED:
+        if background not in _NAMED_BACKGROUNDS:
             raise CagefieldError(
                 f'background must be "white", "black", "none" or (r, g, b), not "{background}"'
             )
-        return _NAMED[background]
+        return _NAMED_BACKGROUNDS[background]
     rgb = np.asarray(background, np.float64)
     if rgb.shape != (3,) or not ((rgb >= 0) & (rgb <= 1)).all():
         raise CagefieldError(f"background must be three numbers in [0, 1], not {np.round(rgb, 4).tolist()}")
@@ -40,7 +40,7 @@ def background_rgb(background: Background) -> tuple[float, float, float] | None:
 
 
 def to_uint8(values: NDArray[Any]) -> NDArray[np.uint8]:
-    """Values of [0,1] as round(255 v) in uint8; values outside are clipped, uint8 comes back as it is."""
+    """Values round(255 v) in uint8 of values v in [0,1]; values outside are clipped, uint8 is unchanged."""
     if values.dtype == np.uint8:
         return values
     return (np.clip(values, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
@@ -48,12 +48,12 @@ def to_uint8(values: NDArray[Any]) -> NDArray[np.uint8]:
 
 @dataclass(frozen=True)
 class RenderResult:
-    """One rendered picture; arrays are read-only.
+    """Rendered image of one camera; arrays are read-only.
 
-    rgb      [H,W,3] float32: over `background`; with background None the straight colour (not premultiplied,
+    rgb      [H,W,3] float32: over `background`; with background None the straight color (not premultiplied,
              0 where opacity is 0)
     opacity  [H,W] float32 in [0,1]
-    depth    [H,W] float32: expected distance along the unit ray, weights normalised; inf where opacity is 0
+    depth    [H,W] float32: expected distance along the unit ray, weights normalized; inf where opacity is 0
     normals  [H,W,3] float32: unit, world space, 0 where opacity is 0; or None
     """
 
@@ -88,20 +88,22 @@ class RenderResult:
         normals: NDArray[Any] | None = None,
         background: Background = None,
     ) -> RenderResult:
-        """Result from the accumulated colour sum(weights * rgb) [H,W,3] over a background."""
-        behind = background_rgb(background)
+        """Result from the accumulated color sum(weights * rgb) [H,W,3] over a background."""
+        background_color = background_rgb(background)
         opacity = np.clip(opacity, 0.0, 1.0)
-        if behind is None:
+        if background_color is None:
             rgb = premultiplied / np.where(opacity > 0, opacity, 1.0)[..., None]
         else:
-            rgb = premultiplied + (1.0 - opacity)[..., None] * np.asarray(behind, premultiplied.dtype)
+            rgb = premultiplied + (1.0 - opacity)[..., None] * np.asarray(
+                background_color, premultiplied.dtype
+            )
         f32 = np.float32
         return cls(
             rgb=rgb.astype(f32),
             opacity=opacity.astype(f32),
             depth=depth.astype(f32),
             normals=None if normals is None else normals.astype(f32),
-            background=behind,
+            background=background_color,
         )
 
     @property
@@ -113,13 +115,13 @@ class RenderResult:
         return int(self.opacity.shape[0])
 
     def premultiplied(self) -> Float32:
-        """Accumulated colour [H,W,3] without the background."""
+        """Accumulated color [H,W,3] without the background."""
         if self.background is None:
             return self.rgb * self.opacity[..., None]
         return self.rgb - (1.0 - self.opacity)[..., None] * np.asarray(self.background, np.float32)
 
     def over(self, background: Background) -> RenderResult:
-        """Image over another background; straight colour over nothing for None."""
+        """Image over another background; straight color over nothing for None."""
         if background_rgb(background) == self.background:
             return self
         other = RenderResult.from_premultiplied(
@@ -128,9 +130,9 @@ class RenderResult:
         return replace(other, normals=self.normals)
 
     def rgb8(self) -> NDArray[np.uint8]:
-        """rgb [H,W,3] uint8."""
+        """Color rgb [H,W,3] uint8."""
         return to_uint8(self.rgb)
 
     def rgba8(self) -> NDArray[np.uint8]:
-        """Straight colour and opacity [H,W,4] uint8."""
+        """Straight color and opacity [H,W,4] uint8."""
         return to_uint8(np.concatenate([self.over(None).rgb, self.opacity[..., None]], axis=-1))

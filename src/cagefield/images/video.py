@@ -1,4 +1,4 @@
-"""ffmpeg as a process that writes a video, and whose failure is an error."""
+"""Video encoder: ffmpeg as a child process whose failure raises an error."""
 
 from __future__ import annotations
 
@@ -11,16 +11,18 @@ from contextlib import contextmanager, suppress
 from fractions import Fraction
 from pathlib import Path
 
-_COMMENT = "made with cagefield"
-"""What the file says of itself."""
+_FILE_COMMENT = "made with cagefield"
+"""Comment in the metadata of a video file, which identifies cagefield's own videos."""
 
-_CAUSES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EACCES, errno.EROFS)
-"""What ffmpeg's own words about a file are searched for."""
+_SYSTEM_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EACCES, errno.EROFS)
+"""System errors whose texts are looked for in ffmpeg's messages."""
 
 
 @contextmanager
-def encoder(path: Path, size: tuple[int, int], fps: float, quality: int) -> Iterator[Callable[[bytes], None]]:
-    """A function that adds a frame of `size` (width, height), even numbers, rgb24, to an H.264 file.
+def open_encoder(
+    path: Path, size: tuple[int, int], fps: float, quality: int
+) -> Iterator[Callable[[bytes], None]]:
+    """Function that adds a frame of `size` (width, height), even numbers, rgb24, to an H.264 file.
 
     The file is whole once the context ends. Where it ends with an error, ffmpeg is killed.
 
@@ -33,7 +35,7 @@ def encoder(path: Path, size: tuple[int, int], fps: float, quality: int) -> Iter
         *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-nostdin", "-xerror", "-v", "error"),
         *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", rate, "-i", "pipe:0"),
         *("-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", str(quality)),
-        *("-metadata", f"comment={_COMMENT}", "-movflags", "+faststart", str(path)),
+        *("-metadata", f"comment={_FILE_COMMENT}", "-movflags", "+faststart", str(path)),
     ]
     process = subprocess.Popen(
         command,
@@ -66,25 +68,25 @@ def encoder(path: Path, size: tuple[int, int], fps: float, quality: int) -> Iter
         process.wait()
 
 
-def is_ours(path: Path) -> bool:
-    """True for a video that an `encoder` wrote."""
+def is_cagefield_video(path: Path) -> bool:
+    """Whether `open_encoder` wrote the video file."""
     try:
         with path.open("rb") as file:
-            # The comment stands at the end of what comes before the pictures, 8 to 20 bytes each.
-            return _COMMENT.encode() in file.read(1 << 24)
+            # The comment stands behind the table of frames, 8 to 20 bytes each.
+            return _FILE_COMMENT.encode() in file.read(1 << 24)
     except OSError:
         return False
 
 
 def _failure(process: subprocess.Popen[bytes], path: Path) -> OSError:
-    """The error that ffmpeg ended with, by the system's number where it tells one."""
+    """Error of ffmpeg, with the system's error number where its messages name one."""
     assert process.stderr is not None
-    words = process.stderr.read().decode(errors="replace")
+    messages = process.stderr.read().decode(errors="replace")
     process.wait()
     if process.returncode == -getattr(signal, "SIGXFSZ", 0):  # more than `ulimit -f`
         return OSError(errno.EFBIG, os.strerror(errno.EFBIG), str(path))
-    for number in _CAUSES:
-        if os.strerror(number).lower() in words.lower():
+    for number in _SYSTEM_ERRORS:
+        if os.strerror(number).lower() in messages.lower():
             return OSError(number, os.strerror(number), str(path))
-    last = (words.strip().splitlines() or [f"exit status {process.returncode}"])[-1]
+    last = (messages.strip().splitlines() or [f"exit status {process.returncode}"])[-1]
     return OSError(errno.EIO, f"the video encoder failed ({last})", str(path))

@@ -1,4 +1,7 @@
-"""Short hands for modelling: profiles, slabs and rows of primitives."""
+"""Builders of textured primitives: profiles, slabs, solids of revolution, tubes.
+
+Notation: gloss is (strength, exponent) of a highlight; MATTE, SATIN and SHINY are its usual values.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cagefield.procedural.parts import Part, Primitive, place
+from cagefield.procedural.parts import Part, Primitive, pose_matrix
 from cagefield.procedural.shapes import Extrusion, Revolution, Shape, Tube
 from cagefield.procedural.textures import Texture
 
@@ -16,8 +19,8 @@ Points2 = Sequence[tuple[float, float]]
 MATTE, SATIN, SHINY = (0.05, 8.0), (0.12, 14.0), (0.25, 22.0)
 
 
-def part(name: str, *primitives: Primitive) -> Part:
-    """A named part."""
+def build_part(name: str, *primitives: Primitive) -> Part:
+    """Part of a name and primitives."""
     return Part(name, primitives)
 
 
@@ -39,7 +42,7 @@ def band(path: Points2, thickness: float) -> Points2:
 
 
 def smooth(profile: Points2, count: int = 4) -> Points2:
-    """Catmull-Rom curve through the points of an open profile, `count` pieces between neighbours."""
+    """Catmull-Rom curve through the points of an open profile, `count` pieces between neighbors."""
     points = np.array([profile[0], *profile, profile[-1]], np.float64)
     t = np.linspace(0, 1, count, endpoint=False)[:, None]
     pieces = []
@@ -50,7 +53,7 @@ def smooth(profile: Points2, count: int = 4) -> Points2:
     return [(float(x), float(y)) for x, y in curve]
 
 
-def upright(
+def upright_slab(
     outline: Points2,
     y: float | Sequence[float],
     half_thickness: float,
@@ -60,13 +63,13 @@ def upright(
     gloss: tuple[float, float] = SATIN,
 ) -> Primitive:
     """Slab with an outline in the xz plane, `2 half_thickness` thick along y, at one y or several."""
-    polygon, (x, z) = _centred(outline)
+    polygon, (x, z) = _center_outline(outline)
     shape = Extrusion(polygon, half_thickness - rounding, rounding)
-    poses = [place((x, level, z), (90, 0, 0)) for level in np.atleast_1d(y)]
+    poses = [pose_matrix((x, level, z), (90, 0, 0)) for level in np.atleast_1d(y)]
     return Primitive(shape, texture, np.stack(poses), gloss)
 
 
-def flat(
+def flat_slab(
     outline: Points2,
     z: float,
     half_thickness: float,
@@ -76,11 +79,13 @@ def flat(
     gloss: tuple[float, float] = SATIN,
 ) -> Primitive:
     """Slab with an outline in the xy plane, `2 half_thickness` thick along z."""
-    polygon, (x, y) = _centred(outline)
-    return at(Extrusion(polygon, half_thickness - rounding, rounding), texture, (x, y, z), gloss=gloss)
+    polygon, (x, y) = _center_outline(outline)
+    return place_shape(
+        Extrusion(polygon, half_thickness - rounding, rounding), texture, (x, y, z), gloss=gloss
+    )
 
 
-def turned(
+def revolve(
     profile: Points2,
     texture: Texture,
     positions: ArrayLike = ((0, 0, 0),),
@@ -89,15 +94,15 @@ def turned(
     rounding: float = 0.0,
     gloss: tuple[float, float] = SATIN,
 ) -> Primitive:
-    """Solids of revolution about z with a profile (radius, z), at positions [K,3], turned about those."""
+    """Solids of revolution about z with a profile (radius, z), at positions [K,3], rotated about these."""
     polygon = np.array(profile)
     middle = float(polygon[:, 1].min() + polygon[:, 1].max()) / 2
-    centred = tuple((float(r), float(z - middle)) for r, z in polygon)
-    poses = [place(p, rotate_deg) @ place((0, 0, middle)) for p in np.atleast_2d(positions)]
-    return Primitive(Revolution(centred, rounding), texture, np.stack(poses), gloss)
+    centered = tuple((float(r), float(z - middle)) for r, z in polygon)
+    poses = [pose_matrix(p, rotate_deg) @ pose_matrix((0, 0, middle)) for p in np.atleast_2d(positions)]
+    return Primitive(Revolution(centered, rounding), texture, np.stack(poses), gloss)
 
 
-def at(
+def place_shape(
     shape: Shape,
     texture: Texture,
     positions: ArrayLike = ((0, 0, 0),),
@@ -106,19 +111,19 @@ def at(
     scale: ArrayLike = 1.0,
     gloss: tuple[float, float] = SATIN,
 ) -> Primitive:
-    """A shape at one position or several [K,3], turned alike."""
-    poses = [place(p, rotate_deg, scale) for p in np.atleast_2d(np.asarray(positions, np.float64))]
+    """Primitive of a shape at one position or several [K,3], with one rotation and scale."""
+    poses = [pose_matrix(p, rotate_deg, scale) for p in np.atleast_2d(np.asarray(positions, np.float64))]
     return Primitive(shape, texture, np.stack(poses), gloss)
 
 
-def posed(
+def pose_shape(
     shape: Shape,
     texture: Texture,
     poses: Iterable[NDArray[np.float64]],
     *,
     gloss: tuple[float, float] = SATIN,
 ) -> Primitive:
-    """A shape placed by matrices [4,4]."""
+    """Primitive of a shape placed by matrices [4,4]."""
     return Primitive(shape, texture, np.stack(list(poses)), gloss)
 
 
@@ -133,21 +138,21 @@ def tube(
     points = np.array(path, np.float64)
     thickness = tuple(float(r) for r in np.atleast_1d(radii))
     middle = (points.min(0) + points.max(0)) / 2
-    centred = tuple((float(x), float(y), float(z)) for x, y, z in points - middle)
-    return at(Tube(centred, thickness), texture, middle, gloss=gloss)
+    centered = tuple((float(x), float(y), float(z)) for x, y, z in points - middle)
+    return place_shape(Tube(centered, thickness), texture, middle, gloss=gloss)
 
 
-def shifted(parts: Iterable[Part], by: ArrayLike) -> tuple[Part, ...]:
-    """Parts modelled elsewhere: all primitives moved by a vector."""
-    move = place(by)
+def shift_parts(parts: Iterable[Part], by: ArrayLike) -> tuple[Part, ...]:
+    """Parts with all primitives moved by a vector."""
+    move = pose_matrix(by)
     return tuple(
         replace(p, primitives=tuple(replace(item, poses=move @ item.poses) for item in p.primitives))
         for p in parts
     )
 
 
-def _centred(outline: Points2) -> tuple[tuple[tuple[float, float], ...], tuple[float, float]]:
-    """(outline about the middle of its box, that middle): bounds are tight only about the origin."""
+def _center_outline(outline: Points2) -> tuple[tuple[tuple[float, float], ...], tuple[float, float]]:
+    """(outline about the center of its box, that center): bounds are tight only about the origin."""
     points = np.array(outline, np.float64)
     middle = (points.min(0) + points.max(0)) / 2
     return tuple((float(x), float(y)) for x, y in points - middle), (float(middle[0]), float(middle[1]))

@@ -27,23 +27,23 @@ from cagefield.errors import DatasetError
 from cagefield.files.atomic import recover_folder, replaced_folder
 from cagefield.files.safe_open import real_path
 from cagefield.procedural.captures import capture
-from cagefield.procedural.distractors import with_distractors
+from cagefield.procedural.distractors import add_distractors
 from cagefield.procedural.flash import FlashLight
-from cagefield.procedural.hand_held import developed, exposures, picture
+from cagefield.procedural.hand_held import develop_photo, exposure_gains, render_image
 from cagefield.procedural.scene import ProceduralScene
-from cagefield.procedural.tracks import Tracks, tracks
-from cagefield.procedural.variations import Changes, changes_of
+from cagefield.procedural.tracks import Tracks, simulate_tracks
+from cagefield.procedural.variations import Changes, draw_changes
 from cagefield.procedural.writer import DepthViews
 from cagefield.typing import Float32, Mask
 
 HOLDOUT = 8
-QUALITY = 95
-"""Of the photos' JPEG files."""
+JPEG_QUALITY = 95
+"""Quality of the photos' JPEG files, 0 to 100."""
 
-OWN = ("images", "transforms.json", "sparse_pc.ply", "colmap", "depth", "distractors")
-"""What a capture's folder holds."""
+CAPTURE_FILES = ("images", "transforms.json", "sparse_pc.ply", "colmap", "depth", "distractors")
+"""Names of the files and folders of a capture."""
 
-LEAST_SIDE = 32
+MIN_SIDE_PIXELS = 32
 
 
 def make_capture(
@@ -72,72 +72,74 @@ def make_capture(
     """
     plan = capture(name)
     count = plan.views if views is None else views
-    longer = max(plan.phone.width, plan.phone.height) if size is None else size
+    longer_side = max(plan.phone.width, plan.phone.height) if size is None else size
     if count < 2:
         raise DatasetError(f"views must be at least 2, not {count}")
-    if longer < LEAST_SIDE:
-        raise DatasetError(f"size must be at least {LEAST_SIDE}, not {longer}")
+    if longer_side < MIN_SIDE_PIXELS:
+        raise DatasetError(f"size must be at least {MIN_SIDE_PIXELS}, not {longer_side}")
     if depth not in get_args(DepthViews):
         raise DatasetError(f"depth must be one of {', '.join(get_args(DepthViews))}, not {depth!r}")
     target = real_path(out_dir)
     recover_folder(target, Path.is_dir)
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise DatasetError(f"{target} is not empty; give another folder or remove it first")
-    phone = plan.phone.resized(longer)
+    phone = plan.phone.resized(longer_side)
     cameras = plan.cameras(phone, count, seed)
     scene = plan.scene if scene is None else scene
     names = [f"frame_{index:05d}.jpg" for index in range(1, count + 1)]
     training = [index % HOLDOUT != 0 for index in range(count)]
-    changes = changes_of(plan.variations, scene, cameras, plan.target, training, seed)
-    shots, shown = [], []
+    changes = draw_changes(plan.variations, scene, cameras, plan.target, training, seed)
+    renders, changed_renders = [], []
     for camera, change in zip(cameras, changes, strict=True):
-        shots.append(picture(scene, camera))
-        shown.append(_changed(scene, camera, change, *shots[-1]))
+        renders.append(render_image(scene, camera))
+        changed_renders.append(_render_changed(scene, camera, change, *renders[-1]))
         if progress is not None:
-            progress(len(shots), count)
+            progress(len(renders), count)
     rng = np.random.RandomState([seed, 7])
-    gains = exposures([rgb for rgb, _ in shots], phone.adapts, rng)
+    gains = exposure_gains([rgb for rgb, _ in renders], phone.adapts, rng)
     photos = [
-        developed(rgb, gain * change.gains, rng)
-        for (rgb, _, _), gain, change in zip(shown, gains, changes, strict=True)
+        develop_photo(rgb, gain * change.gains, rng)
+        for (rgb, _, _), gain, change in zip(changed_renders, gains, changes, strict=True)
     ]
-    depths = [distance for _, distance in shots]
+    depths = [distance for _, distance in renders]
     with replaced_folder(target, ()) as draft:
         (draft / "images").mkdir()
         for file, photo in zip(names, photos, strict=True):
-            Image.fromarray(photo).save(draft / "images" / file, quality=QUALITY, subsampling=0)
+            Image.fromarray(photo).save(draft / "images" / file, quality=JPEG_QUALITY, subsampling=0)
         if depth != "none":
             (draft / "depth").mkdir()
             for index in range(0, count, HOLDOUT if depth == "test" else 1):
                 np.save(draft / "depth" / f"{Path(names[index]).stem}.npy", depths[index])
-        for file, (_, _, distractor) in zip(names, shown, strict=True):
+        for file, (_, _, distractor) in zip(names, changed_renders, strict=True):
             if distractor is not None:
                 (draft / "distractors").mkdir(exist_ok=True)
                 Image.fromarray(distractor).save(draft / "distractors" / f"{Path(file).stem}.png")
         values = _transforms(cameras, names)
         if points:
-            found = tracks(photos, [distance for _, distance, _ in shown], cameras, seed=seed)
+            tracks = simulate_tracks(
+                photos, [distance for _, distance, _ in changed_renders], cameras, seed=seed
+            )
             values["ply_file_path"] = "sparse_pc.ply"
-            _write_ply(found, draft / "sparse_pc.ply")
-            _write_colmap(found, cameras, names, draft / "colmap/sparse/0")
+            _write_ply(tracks, draft / "sparse_pc.ply")
+            _write_colmap(tracks, cameras, names, draft / "colmap/sparse/0")
         (draft / "transforms.json").write_text(json.dumps(values, indent=1), encoding="utf-8")
     return target
 
 
-def _changed(
+def _render_changed(
     scene: ProceduralScene, camera: Camera, change: Changes, rgb: Float32, distance: Float32
 ) -> tuple[Float32, Float32, Mask | None]:
-    """(rgb, distance, pixels of distractors or None for none) of a picture of the scene after its changes."""
+    """(rgb, distance, distractor pixels or None for none) of an image of the scene after its changes."""
     if change.flash:
-        scene = scene.lit_by(FlashLight(scene.light, camera.origin))
-        rgb, distance = picture(scene, camera)
+        scene = scene.with_light(FlashLight(scene.light, camera.origin))
+        rgb, distance = render_image(scene, camera)
     if not change.parts:
         return rgb, distance, None
-    return with_distractors(scene, change.parts, camera, rgb, distance)
+    return add_distractors(scene, change.parts, camera, rgb, distance)
 
 
 def _transforms(cameras: Sequence[Camera], names: Sequence[str]) -> dict[str, object]:
-    """nerfstudio's transforms.json."""
+    """Content of nerfstudio's transforms.json."""
     first = cameras[0]
     k1, k2, p1, p2 = (*first.distortion, 0.0, 0.0, 0.0, 0.0)[:4]
     return {
@@ -156,20 +158,20 @@ def _transforms(cameras: Sequence[Camera], names: Sequence[str]) -> dict[str, ob
     }
 
 
-def _write_ply(found: Tracks, path: Path) -> None:
-    """nerfstudio's sparse_pc.ply: ASCII positions and colours."""
-    header = ["ply", "format ascii 1.0", f"element vertex {len(found)}"]
+def _write_ply(tracks: Tracks, path: Path) -> None:
+    """Write nerfstudio's sparse_pc.ply: ASCII positions and colors."""
+    header = ["ply", "format ascii 1.0", f"element vertex {len(tracks)}"]
     header += [f"property float {axis}" for axis in "xyz"]
     header += [f"property uint8 {channel}" for channel in ("red", "green", "blue")]
     rows = (
         f"{x:.6f} {y:.6f} {z:.6f} {r} {g} {b}"
-        for (x, y, z), (r, g, b) in zip(found.positions, found.rgb, strict=True)
+        for (x, y, z), (r, g, b) in zip(tracks.positions, tracks.rgb, strict=True)
     )
     path.write_text("\n".join([*header, "end_header", *rows]) + "\n", encoding="utf-8")
 
 
-def _write_colmap(found: Tracks, cameras: Sequence[Camera], names: Sequence[str], folder: Path) -> None:
-    """A COLMAP model as text. Source: COLMAP's documentation, "Output format"."""
+def _write_colmap(tracks: Tracks, cameras: Sequence[Camera], names: Sequence[str], folder: Path) -> None:
+    """Write a COLMAP model as text. Source: COLMAP's documentation, "Output format"."""
     folder.mkdir(parents=True)
     first = cameras[0]
     lens = (*first.distortion, 0.0, 0.0, 0.0, 0.0)[:4]
@@ -178,30 +180,30 @@ def _write_colmap(found: Tracks, cameras: Sequence[Camera], names: Sequence[str]
         f"1 OPENCV {first.width} {first.height} {numbers}\n", encoding="utf-8"
     )
     lines = []
-    row_in_image = np.zeros(len(found.view), int)
+    row_in_image = np.zeros(len(tracks.view), int)
     for index, (camera, name) in enumerate(zip(cameras, names, strict=True)):
         rotation = (camera.c2w[:3, :3] * (1.0, -1.0, -1.0)).T
         x, y, z, w = Rotation.from_matrix(rotation).as_quat()
         shift = -rotation @ camera.origin
         lines.append(" ".join([str(index + 1), *(repr(float(v)) for v in (w, x, y, z, *shift)), "1", name]))
-        mine = np.flatnonzero(found.view == index)
-        row_in_image[mine] = np.arange(len(mine))
+        rows_of = np.flatnonzero(tracks.view == index)
+        row_in_image[rows_of] = np.arange(len(rows_of))
         lines.append(
             " ".join(
                 f"{u:.3f} {v:.3f} {point + 1}"
-                for (u, v), point in zip(found.pixel[mine], found.point[mine], strict=True)
+                for (u, v), point in zip(tracks.pixel[rows_of], tracks.point[rows_of], strict=True)
             )
         )
     (folder / "images.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    order = np.argsort(found.point, kind="stable")
-    ends = np.searchsorted(found.point[order], np.arange(len(found) + 1))
+    order = np.argsort(tracks.point, kind="stable")
+    ends = np.searchsorted(tracks.point[order], np.arange(len(tracks) + 1))
     rows = []
-    for index in range(len(found)):
-        mine = order[ends[index] : ends[index + 1]]
+    for index in range(len(tracks)):
+        rows_of = order[ends[index] : ends[index + 1]]
         track = " ".join(
-            f"{view + 1} {row}" for view, row in zip(found.view[mine], row_in_image[mine], strict=True)
+            f"{view + 1} {row}" for view, row in zip(tracks.view[rows_of], row_in_image[rows_of], strict=True)
         )
-        x, y, z = found.positions[index]
-        r, g, b = found.rgb[index]
-        rows.append(f"{index + 1} {x:.9g} {y:.9g} {z:.9g} {r} {g} {b} {found.errors[index]:.4f} {track}")
+        x, y, z = tracks.positions[index]
+        r, g, b = tracks.rgb[index]
+        rows.append(f"{index + 1} {x:.9g} {y:.9g} {z:.9g} {r} {g} {b} {tracks.errors[index]:.4f} {track}")
     (folder / "points3D.txt").write_text("\n".join(rows) + "\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The captures of the built-in rooms by name: which room, and where the phone was held."""
+"""Captures of the built-in rooms by name: the room and the path of the phone."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cache
 
 from cagefield.cameras.camera import Camera
 from cagefield.errors import SceneError
-from cagefield.procedural.hand_held import Phone, around, outwards
+from cagefield.procedural.hand_held import Phone, look_outwards, orbit_target
 from cagefield.procedural.rooms import ROOMS
 from cagefield.procedural.scene import ProceduralScene
 from cagefield.procedural.variations import split_name
@@ -16,10 +16,10 @@ from cagefield.procedural.variations import split_name
 
 @dataclass(frozen=True)
 class Capture:
-    """A room that is photographed: `cameras(phone, number of photos, seed)` says from where.
+    """Capture of a room: `cameras(phone, number of photos, seed)` returns its cameras.
 
     target      the point that the cameras go round, None where they look outwards
-    variations  how its training photos disagree, names of `variations.VARIATIONS`
+    variations  names of `variations.VARIATIONS`, by which its training photos differ
     """
 
     name: str
@@ -31,7 +31,7 @@ class Capture:
 
     @property
     def scene(self) -> ProceduralScene:
-        """The room and what stands in it; always the same object, whose light is computed once."""
+        """Room and its contents; one cached object per room, whose light is computed once."""
         return _room(split_name(self.name)[0])
 
 
@@ -45,28 +45,30 @@ _DIGGER, _CHAIR, _MICROPHONE = (0.0, 0.0, -0.05), (0.2, 0.3, 0.1), (0.1, 0.0, 0.
 
 
 def _circle(phone: Phone, count: int, seed: int) -> tuple[Camera, ...]:
-    return around(
+    return orbit_target(
         phone, _DIGGER, count=count, seed=seed + 1, start_deg=-90, sweep_deg=360, turns=2,
         distance=(2.2, 3.1), height=(0.5, 2.2),
     )  # fmt: skip
 
 
 def _arc(phone: Phone, count: int, seed: int) -> tuple[Camera, ...]:
-    return around(
+    return orbit_target(
         phone, _CHAIR, count=count, seed=seed + 2, start_deg=-105, sweep_deg=75,
         distance=(2.9, 3.9), height=(0.2, 1.5),
     )  # fmt: skip
 
 
 def _close_up(phone: Phone, count: int, seed: int) -> tuple[Camera, ...]:
-    return around(
+    return orbit_target(
         phone, _MICROPHONE, count=count, seed=seed + 3, start_deg=-190, sweep_deg=200, turns=2,
         distance=(1.3, 1.9), height=(-0.1, 1.0), sway=0.12,
     )  # fmt: skip
 
 
 def _tour(phone: Phone, count: int, seed: int) -> tuple[Camera, ...]:
-    return outwards(phone, (0.5, -0.5, 1.2), count=count, seed=seed + 4, radius=2.6, drop_deg=14, turns=3)
+    return look_outwards(
+        phone, (0.5, -0.5, 1.2), count=count, seed=seed + 4, radius=2.6, drop_deg=14, turns=3
+    )
 
 
 CAPTURES = {
@@ -87,14 +89,14 @@ CAPTURES = {
 
 
 def is_capture(name: str) -> bool:
-    """Whether a name is that of a built-in room, with variations or without."""
+    """Whether `name` is a built-in room, with variations or without."""
     return name.split("+")[0] in CAPTURES
 
 
 def capture(name: str) -> Capture:
-    """The capture of that name, with the variations after plus signs.
+    """Capture of a name, with the variations after plus signs.
 
-    Raises SceneError with the names there are.
+    Raises SceneError that lists the names.
     """
     room, variations = split_name(name)
     if room not in CAPTURES:

@@ -9,21 +9,21 @@ from cagefield.procedural.building import (
     SATIN,
     SHINY,
     Points2,
-    at,
-    part,
-    posed,
+    build_part,
+    place_shape,
+    pose_shape,
+    revolve,
     smooth,
     tube,
-    turned,
 )
-from cagefield.procedural.parts import Part, Primitive, place
+from cagefield.procedural.parts import Part, Primitive, pose_matrix
 from cagefield.procedural.scene import ProceduralScene
 from cagefield.procedural.shapes import Box, Extrusion, Sphere
-from cagefield.procedural.textures import Plain, Texture, Tiled, Wood, hexcolor
+from cagefield.procedural.textures import Plain, Texture, Tiled, Wood, rgb_from_hex
 
-LIGHT, DARK = hexcolor("#a9683a"), hexcolor("#6f3d20")
+LIGHT, DARK = rgb_from_hex("#a9683a"), rgb_from_hex("#6f3d20")
 OAK = Wood(LIGHT, DARK)
-CLOTH, SPRIG, GOLD = hexcolor("#e9e0c8"), hexcolor("#356b5e"), hexcolor("#c99a3b")
+CLOTH, SPRIG, GOLD = rgb_from_hex("#e9e0c8"), rgb_from_hex("#356b5e"), rgb_from_hex("#c99a3b")
 FABRIC = Tiled(CLOTH, SPRIG, GOLD, 0.16)
 SEAT_Z = -0.12
 
@@ -31,7 +31,7 @@ SEAT_Z = -0.12
 def chair() -> ProceduralScene:
     """Scene with the parts seat, cushion, back, four legs and two arm rests.
 
-    Back, cushion and arm rests stand on the seat and touch nothing else, so that a cage can hold one alone.
+    Back, cushion and arm rests touch the seat alone, so that a cage can hold one of them alone.
     """
     legs = [
         _leg(f"leg {end} {side}", x, y)
@@ -44,10 +44,10 @@ def chair() -> ProceduralScene:
 
 def _seat() -> Part:
     rail = Wood(LIGHT, DARK, axis=0)
-    return part(
+    return build_part(
         "seat",
-        at(Box((0.47, 0.47, 0.055), 0.02), rail, (0, 0, SEAT_Z)),
-        at(Box((0.44, 0.44, 0.02), 0.015), Plain(DARK), (0, 0, SEAT_Z + 0.06)),
+        place_shape(Box((0.47, 0.47, 0.055), 0.02), rail, (0, 0, SEAT_Z)),
+        place_shape(Box((0.44, 0.44, 0.02), 0.015), Plain(DARK), (0, 0, SEAT_Z + 0.06)),
     )
 
 
@@ -55,22 +55,23 @@ def _cushion() -> Part:
     corners = ((1, 1), (-1, 1), (-1, -1), (1, -1))
     piping = [(0.05 + 0.358 * x, 0.358 * y, SEAT_Z + 0.16) for x, y in (*corners, corners[0])]
     buttons = [
-        place((0.05 + 0.18 * x, 0.18 * y, SEAT_Z + 0.228), scale=(0.025, 0.025, 0.012)) for x, y in corners
+        pose_matrix((0.05 + 0.18 * x, 0.18 * y, SEAT_Z + 0.228), scale=(0.025, 0.025, 0.012))
+        for x, y in corners
     ]
-    return part(
+    return build_part(
         "cushion",
-        at(Box((0.36, 0.36, 0.07), 0.065), FABRIC, (0.05, 0, SEAT_Z + 0.16), gloss=MATTE),
+        place_shape(Box((0.36, 0.36, 0.07), 0.065), FABRIC, (0.05, 0, SEAT_Z + 0.16), gloss=MATTE),
         tube(piping, 0.016, Plain(GOLD), gloss=MATTE),
-        posed(Sphere(), Plain(GOLD), buttons),
+        pose_shape(Sphere(), Plain(GOLD), buttons),
     )
 
 
 def _back() -> Part:
     """Frame and panel on two stiles, in a plane that leans back: local x across, y up, z to the rear."""
     lean = (
-        place((-0.4, 0, SEAT_Z + 0.08), (0, -10, 0))
-        @ place((0, 0, 0), (90, 0, 0))
-        @ place((0, 0, 0), (0, 90, 0))
+        pose_matrix((-0.4, 0, SEAT_Z + 0.08), (0, -10, 0))
+        @ pose_matrix((0, 0, 0), (90, 0, 0))
+        @ pose_matrix((0, 0, 0), (0, 90, 0))
     )
     crown: Points2 = smooth(
         [(0.45, 0.72), (0.3, 0.88), (0.12, 0.98), (0, 1.0), (-0.12, 0.98), (-0.3, 0.88), (-0.45, 0.72)], 3
@@ -87,20 +88,20 @@ def _back() -> Part:
         rounding: float,
         gloss: tuple[float, float],
     ) -> Primitive:
-        centred = tuple((x, y - 0.5) for x, y in outline)
-        pose = lean @ place((0, 0.5, depth))
-        return posed(Extrusion(centred, half - rounding, rounding), texture, [pose], gloss=gloss)
+        centered = tuple((x, y - 0.5) for x, y in outline)
+        pose = lean @ pose_matrix((0, 0.5, depth))
+        return pose_shape(Extrusion(centered, half - rounding, rounding), texture, [pose], gloss=gloss)
 
-    return part(
+    return build_part(
         "back",
         panel(frame, 0.0, 0.035, Wood(LIGHT, DARK, axis=1), 0.015, SATIN),
         panel(inner, 0.0, 0.065, FABRIC, 0.025, MATTE),
-        posed(
+        pose_shape(
             Box((0.03, 0.11, 0.03), 0.01),
             Wood(LIGHT, DARK, axis=1),
-            [lean @ place((x, 0.117, 0)) for x in (-0.38, 0.38)],
+            [lean @ pose_matrix((x, 0.117, 0)) for x in (-0.38, 0.38)],
         ),
-        posed(Sphere(0.045), Plain(GOLD), [lean @ place((0, 1.035, 0))], gloss=SHINY),
+        pose_shape(Sphere(0.045), Plain(GOLD), [lean @ pose_matrix((0, 1.035, 0))], gloss=SHINY),
     )
 
 
@@ -111,18 +112,20 @@ def _leg(name: str, x: float, y: float) -> Part:
         (0.03, foot + 0.12), (0.055, foot + 0.06), (0.03, foot),
     ]  # fmt: skip
     profile = [(0.0, top), (0.062, top), (0.062, top - 0.1), *smooth(vase), (0.0, foot)]
-    return part(name, turned(profile, OAK, (x, y, 0.0)))
+    return build_part(name, revolve(profile, OAK, (x, y, 0.0)))
 
 
 def _arm(name: str, side: float) -> Part:
-    """The arm rest at +y (side 1) or -y (side -1), on a post that leans outwards from the seat."""
+    """Arm rest at +y (side 1) or -y (side -1), on a post that leans outwards from the seat."""
     top, foot, y = SEAT_Z + 0.42, SEAT_Z + 0.115, 0.49 * side
     path = smooth([(-0.32, 0.0), (-0.2, 0.03), (0.1, 0.02), (0.36, -0.01), (0.43, -0.06)], 3)
     post = smooth([(0.33, top - 0.03), (0.37, top - 0.14), (0.4, foot + 0.06), (0.435, foot)], 3)
     lean = np.linspace(y, 0.443 * side, len(post))
-    return part(
+    return build_part(
         name,
         tube([(x, y, top + z) for x, z in path], 0.045, Wood(LIGHT, DARK, axis=0)),
         tube([(x, at_y, z) for (x, z), at_y in zip(post, lean, strict=True)], 0.034, OAK),
-        at(Box((0.13, 0.05, 0.034), 0.03), Plain(SPRIG, 0.08, 0.05), (-0.02, y, top + 0.045), gloss=MATTE),
+        place_shape(
+            Box((0.13, 0.05, 0.034), 0.03), Plain(SPRIG, 0.08, 0.05), (-0.02, y, top + 0.045), gloss=MATTE
+        ),
     )

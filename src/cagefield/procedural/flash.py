@@ -1,4 +1,4 @@
-"""A flash: a small lamp at the camera, beside the light of the room."""
+"""Flash light: a small lamp at the camera, in addition to the light of the room."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from cagefield.procedural.shading import Light, dot
-from cagefield.procedural.srgb import encoded, linear
+from cagefield.procedural.srgb import decode_srgb, encode_srgb
 from cagefield.typing import Array, Float32
 
-STRENGTH = 5.0
-"""Linear light that a white surface sends back from a distance of 1, seen at right angles: 25 cm."""
+FLASH_STRENGTH = 5.0
+"""Linear light from a white surface at a distance of 1 (25 cm), lit and seen at right angles."""
 
-NEAREST = 0.7
-"""Distance below which the flash gets no brighter."""
+MIN_FLASH_DISTANCE = 0.7
+"""Distance below which the flash gets no brighter, room units."""
 
 
 @dataclass(frozen=True)
 class FlashLight:
-    """The light of a scene, and of a lamp at `eye` [3]: linear light is added.
+    """Light of a scene plus a lamp at `eye` [3], added in linear light.
 
-    linear(rgb) = linear(rgb of the scene's light) + (linear(albedo) + g cos^h) STRENGTH cos / r^2, r the
-    distance, cos that between normal and direction to the eye, g and h strength and exponent of the gloss.
+    linear(rgb) = linear(rgb of the scene's light) + (linear(albedo) + g cos^h) FLASH_STRENGTH cos / r^2, r
+    the distance, cos between normal and direction to the eye, g and h strength and exponent of the gloss.
     """
 
     ambient: Light
@@ -43,6 +43,6 @@ class FlashLight:
         toward = self.eye.astype(np.float32)[:, None] - points
         square = np.maximum(dot(toward, toward), np.float32(1e-6))
         cosine = np.maximum(dot(normals, toward) / np.sqrt(square), np.float32(0))
-        power = np.float32(STRENGTH) * cosine / np.maximum(square, np.float32(NEAREST**2))
-        sent = linear(albedo) + (np.float32(gloss[0]) * cosine ** np.float32(gloss[1]))[:, None]
-        return encoded(linear(np.maximum(rgb, 0)) + sent * power[:, None]).astype(np.float32)
+        power = np.float32(FLASH_STRENGTH) * cosine / np.maximum(square, np.float32(MIN_FLASH_DISTANCE**2))
+        sent = decode_srgb(albedo) + (np.float32(gloss[0]) * cosine ** np.float32(gloss[1]))[:, None]
+        return encode_srgb(decode_srgb(np.maximum(rgb, 0)) + sent * power[:, None]).astype(np.float32)

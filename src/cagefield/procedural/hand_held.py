@@ -1,7 +1,7 @@
-"""Cameras as a person with a phone holds them, and what the phone makes of what it sees.
+"""Cameras of a hand-held phone, and the photos that it takes.
 
-A walk is a smooth path with jitter; the camera looks roughly at what is photographed, a little rolled. A
-photo is a picture with the phone's exposure, noise and 8 bits.
+A walk is a smooth path with jitter; the camera looks roughly at its subject, a little rolled. A photo is an
+image with the phone's exposure, noise and 8 bits.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter, minimum_filter
 from scipy.spatial.transform import Rotation
 
 from cagefield.cameras.camera import Camera
-from cagefield.procedural.parts import apply
+from cagefield.procedural.parts import transform_vectors
 from cagefield.procedural.scene import ProceduralScene
-from cagefield.procedural.srgb import encoded, linear
+from cagefield.procedural.srgb import decode_srgb, encode_srgb
 from cagefield.typing import Array, Float32
 
-EDGE = 0.03
-"""A pixel is sampled more finely where it differs from a neighbour by more than this."""
+MIN_EDGE_CONTRAST = 0.03
+"""Minimum difference of a pixel from a neighbor for finer sampling."""
 
-SHOT_NOISE, READ_NOISE = 2.0e-4, 3.0e-3
+SHOT_NOISE_VARIANCE, READ_NOISE_DEVIATION = 2.0e-4, 3.0e-3
 """Variance per unit of linear light, and deviation in the dark: about 42 dB on a wall."""
 
 
 @dataclass(frozen=True)
 class Phone:
-    """Photos of width x height pixels with a horizontal field of view in degrees.
+    """Phone whose photos have width x height pixels and a horizontal field of view in degrees.
 
     distortion  OPENCV coefficients k1, k2, p1, p2; empty for a pinhole
-    adapts      share of the change of the scene's brightness that the exposure makes up for, 0 to 1
+    adapts      share of the change of the scene's brightness that the exposure compensates, 0 to 1
     """
 
     width: int = 360
@@ -42,7 +42,7 @@ class Phone:
     adapts: float = 0.5
 
     def camera(self, eye: ArrayLike, target: ArrayLike, roll_deg: float) -> Camera:
-        """The phone at `eye` [3] that looks at `target` [3], turned about its axis."""
+        """Camera at `eye` [3] that looks at `target` [3], rotated about its axis by `roll_deg`."""
         camera = Camera.look_at(
             eye, target, width=self.width, height=self.height, fov_x=float(np.radians(self.fov_x_deg))
         )
@@ -53,28 +53,28 @@ class Phone:
         return replace(camera, c2w=pose, model="opencv", distortion=self.distortion)
 
     def resized(self, longer_side: int) -> Phone:
-        """The same phone with smaller or larger photos."""
+        """Phone with photos of another size and the given longer side."""
         scale = longer_side / max(self.width, self.height)
         return replace(
             self, width=max(1, round(self.width * scale)), height=max(1, round(self.height * scale))
         )
 
 
-def walk(rng: np.random.RandomState, count: int, spread: ArrayLike, smooth: float = 2.5) -> Array:
-    """A smooth random path [count,K] about 0 with the deviations `spread` [K]."""
+def random_walk(rng: np.random.RandomState, count: int, spread: ArrayLike, smooth: float = 2.5) -> Array:
+    """Smooth random path [count,K] about 0 with the standard deviations `spread` [K]."""
     size = np.atleast_1d(np.asarray(spread, np.float64))
     path = gaussian_filter1d(rng.standard_normal((count + 20, len(size))), smooth, axis=0)[10:-10]
     return path / np.maximum(path.std(axis=0), 1e-9) * size
 
 
-def rolls(rng: np.random.RandomState, count: int) -> Array:
-    """Angles [count] in degrees by which the phone is turned: a few degrees, now and then much more."""
+def draw_roll_angles(rng: np.random.RandomState, count: int) -> Array:
+    """Random roll angles [count] of the phone in degrees: a few degrees, sometimes many more."""
     angles = rng.normal(0, 2.0, count)
     angles[rng.uniform(size=count) < 0.1] *= 6.0
     return np.clip(angles, -25.0, 25.0)
 
 
-def around(
+def orbit_target(
     phone: Phone,
     target: ArrayLike,
     *,
@@ -89,50 +89,53 @@ def around(
 ) -> tuple[Camera, ...]:
     """Cameras on an arc about a target [3], seen from above from `start_deg` (0 is +x) on.
 
-    Distance (level) and height above the target go up and down within their limits along the arc, `turns`
-    times round; `sway` is the jitter of the eye and of the target, relative to the distance.
+    Distance (level) and height above the target vary within their limits along the arc, `turns` times round;
+    `sway` is the jitter of the eye and of the target, relative to the distance.
     """
     rng = np.random.RandomState(seed)
     share = (np.arange(count) + 0.5 + rng.uniform(-0.3, 0.3, count)) / count
     angle = np.radians(start_deg + sweep_deg * np.mod(turns * share, 1 if turns > 1 else 2))
-    wave = np.clip(0.5 + walk(rng, count, (0.3, 0.3)), 0, 1)
+    wave = np.clip(0.5 + random_walk(rng, count, (0.3, 0.3)), 0, 1)
     level = distance[0] + (distance[1] - distance[0]) * wave[:, 0]
     up = height[0] + (height[1] - height[0]) * wave[:, 1]
     middle = np.asarray(target, np.float64)
     eyes = middle + np.stack([level * np.cos(angle), level * np.sin(angle), up], 1)
     eyes += sway / 2 * level[:, None] * rng.uniform(-1, 1, (count, 3))
     targets = middle + sway * level[:, None] * rng.uniform(-1, 1, (count, 3))
-    return tuple(phone.camera(*where) for where in zip(eyes, targets, rolls(rng, count), strict=True))
+    return tuple(
+        phone.camera(*where) for where in zip(eyes, targets, draw_roll_angles(rng, count), strict=True)
+    )
 
 
-def outwards(
+def look_outwards(
     phone: Phone, middle: ArrayLike, *, count: int, seed: int, radius: float, drop_deg: float, turns: int = 2
 ) -> tuple[Camera, ...]:
     """Cameras on a loop about a point [3] that look away from it, about `drop_deg` below the horizon."""
     rng = np.random.RandomState(seed)
     share = (np.arange(count) + rng.uniform(-0.3, 0.3, count)) / count
     angle = 2 * np.pi * turns * share
-    where = walk(rng, count, (0.25 * radius, 0.25 * radius, 0.15 * radius), 1.5)
+    where = random_walk(rng, count, (0.25 * radius, 0.25 * radius, 0.15 * radius), 1.5)
     eyes = np.asarray(middle, np.float64) + where
     eyes[:, 0] += radius * np.cos(angle + 2.0)
     eyes[:, 1] += radius * np.sin(angle + 2.0)
-    drop = np.radians(drop_deg + walk(rng, count, 9.0, 1.0)[:, 0])
+    drop = np.radians(drop_deg + random_walk(rng, count, 9.0, 1.0)[:, 0])
     heading = angle + np.radians(rng.normal(0, 6.0, count))
     ahead = np.stack([np.cos(heading) * np.cos(drop), np.sin(heading) * np.cos(drop), -np.sin(drop)], 1)
     return tuple(
-        phone.camera(eye, eye + d, roll) for eye, d, roll in zip(eyes, ahead, rolls(rng, count), strict=True)
+        phone.camera(eye, eye + d, roll)
+        for eye, d, roll in zip(eyes, ahead, draw_roll_angles(rng, count), strict=True)
     )
 
 
-def picture(scene: ProceduralScene, camera: Camera) -> tuple[Float32, Float32]:
-    """(rgb [H,W,3], distance [H,W] along the rays through the pixels' centres, inf for no surface).
+def render_image(scene: ProceduralScene, camera: Camera) -> tuple[Float32, Float32]:
+    """(rgb [H,W,3], distance [H,W] along the rays through the pixels' centers, inf for no surface).
 
-    One ray a pixel, and the mean of four where the picture has an edge. rgb may exceed 1.
+    One ray a pixel, and the mean of four where the image has an edge. rgb may exceed 1.
     """
     shape = (camera.height, camera.width)
     rgb, _, hits = scene.shoot(camera.origin, pixel_directions(camera))
     image = rgb.reshape(*shape, 3)
-    rows, columns = np.nonzero(contrast(image) > EDGE)
+    rows, columns = np.nonzero(local_contrast(image) > MIN_EDGE_CONTRAST)
     if len(rows):
         sharp, _, _ = scene.shoot(camera.origin, fine_directions(camera, rows, columns))
         image[rows, columns] = sharp.reshape(len(rows), 4, 3).mean(axis=1)
@@ -140,35 +143,37 @@ def picture(scene: ProceduralScene, camera: Camera) -> tuple[Float32, Float32]:
 
 
 def pixel_directions(camera: Camera) -> Float32:
-    """Unit world directions [3,H*W] of the rays through the pixels' centres."""
-    return apply(camera.c2w[:3, :3], camera.local_directions().T)
+    """Unit world directions [3,H*W] of the rays through the pixels' centers."""
+    return transform_vectors(camera.c2w[:3, :3], camera.local_directions().T)
 
 
 def fine_directions(camera: Camera, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Float32:
     """Unit world directions [3,4K] of four rays through each of K pixels."""
     fine = camera.resized(2 * camera.width, 2 * camera.height).local_directions()
     fine = fine.reshape(camera.height, 2, camera.width, 2, 3)
-    return apply(camera.c2w[:3, :3], fine[rows, :, columns].reshape(-1, 3).T)
+    return transform_vectors(camera.c2w[:3, :3], fine[rows, :, columns].reshape(-1, 3).T)
 
 
-def contrast(image: Float32) -> Float32:
+def local_contrast(image: Float32) -> Float32:
     """Largest difference [H,W] of a channel within 3x3 pixels."""
     size = (3, 3, 1)
     difference: Float32 = (maximum_filter(image, size) - minimum_filter(image, size)).max(axis=-1)
     return difference
 
 
-def exposures(pictures: Sequence[Float32], adapts: float, rng: np.random.RandomState) -> Float32:
-    """Gains [V,3] of linear light: darker where the picture is bright, a little chance, white balance."""
-    brightness = np.array([linear(np.minimum(picture, 1)).mean() for picture in pictures])
+def exposure_gains(pictures: Sequence[Float32], adapts: float, rng: np.random.RandomState) -> Float32:
+    """Gains [V,3] of linear light: lower for bright images, with a little randomness and white balance."""
+    brightness = np.array([decode_srgb(np.minimum(render_image, 1)).mean() for render_image in pictures])
     gains = (np.exp(np.log(brightness).mean()) / brightness) ** adapts
     gains = np.clip(gains * np.exp(rng.normal(0, 0.04, len(gains))), 0.55, 1.8)
-    balance = np.exp(walk(rng, len(gains), (0.012, 0.0, 0.012)))
+    balance = np.exp(random_walk(rng, len(gains), (0.012, 0.0, 0.012)))
     return (gains[:, None] * balance / np.exp(np.log(gains).mean())).astype(np.float32)
 
 
-def developed(rgb: Float32, gains: Float32, rng: np.random.RandomState) -> NDArray[np.uint8]:
-    """The photo [H,W,3] uint8 of a picture at an exposure [3], with the sensor's noise."""
-    light = linear(rgb) * gains
-    light = light + rng.standard_normal(light.shape) * np.sqrt(SHOT_NOISE * light + READ_NOISE**2)
-    return (encoded(np.clip(light, 0, 1)) * 255 + 0.5).astype(np.uint8)
+def develop_photo(rgb: Float32, gains: Float32, rng: np.random.RandomState) -> NDArray[np.uint8]:
+    """Photo [H,W,3] uint8 of an image with exposure gains [3], with the sensor's noise."""
+    light = decode_srgb(rgb) * gains
+    light = light + rng.standard_normal(light.shape) * np.sqrt(
+        SHOT_NOISE_VARIANCE * light + READ_NOISE_DEVIATION**2
+    )
+    return (encode_srgb(np.clip(light, 0, 1)) * 255 + 0.5).astype(np.uint8)

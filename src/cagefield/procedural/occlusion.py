@@ -1,4 +1,4 @@
-"""Baked occlusion of a scene as modelled: corners and gaps are darker, as ambient light would have it."""
+"""Baked ambient occlusion of a scene as modeled: corners and gaps are darker."""
 
 from __future__ import annotations
 
@@ -9,21 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from cagefield.procedural.parts import Part, Placed
+from cagefield.procedural.parts import Part, PlacedPrimitive
 
 
-class Around(Protocol):
-    """A closed surface seen from within."""
+class EnclosingSurface(Protocol):
+    """Closed surface around the parts, such as the walls of a room."""
 
     def distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Distance [N] of points [3,N] within it to its nearest wall, negative outside."""
+        """Distance [N] of inside points [3,N] to the nearest wall, negative outside."""
         ...
 
 
 class Occlusion:
-    """Openness in [0,1] of surface points of the scene as modelled, from a lattice of distances.
+    """Openness in [0,1] of surface points of the scene as modeled, from a lattice of distances.
 
-    1 - sum_i w_i max(0, h_i - distance(p + h_i n)) / h_i: how much nearer other surfaces are than open space.
+    1 - sum_i w_i max(0, h_i - distance(p + h_i n)) / h_i: distances to other surfaces against those in open
+    space.
     """
 
     taps = ((0.06, 0.45), (0.14, 0.35), (0.28, 0.2))
@@ -31,17 +32,22 @@ class Occlusion:
     def __init__(
         self,
         parts: tuple[Part, ...],
-        around: Around | None = None,
+        enclosing: EnclosingSurface | None = None,
         spacing: float = 0.025,
         *,
-        beside: Occlusion | None = None,
+        aligned_with: Occlusion | None = None,
     ) -> None:
-        """`around`: a closed surface that the parts stand in, as a room's walls; `spacing`: the lattice's.
+        """Occlusion of `parts` inside `enclosing`, from a lattice with `spacing`.
 
-        `beside`: another of the same spacing, whose lattice this one's continues: where both know the same
-        surfaces they are equal.
+        `aligned_with`: another occlusion of the same spacing, whose lattice this one's continues: where both
+        have the same surfaces they are equal.
         """
-        self._parts, self._around, self.spacing, self._beside = parts, around, spacing, beside
+        self._parts, self._enclosing, self.spacing, self._aligned_with = (
+            parts,
+            enclosing,
+            spacing,
+            aligned_with,
+        )
 
     @cached_property
     def _lattice(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -49,14 +55,14 @@ class Occlusion:
         reach = self.reach
         lows = np.min([part.bounds[0] for part in self._parts], 0) - reach
         highs = np.max([part.bounds[1] for part in self._parts], 0) + reach
-        if self._beside is not None:
-            node = self._beside._lattice[0].astype(np.float64)
+        if self._aligned_with is not None:
+            node = self._aligned_with._lattice[0].astype(np.float64)
             lows = node + np.floor((lows - node) / self.spacing + 1e-3) * self.spacing
         axes = [np.arange(lo, hi + self.spacing, self.spacing) for lo, hi in zip(lows, highs, strict=True)]
         lattice = np.full([len(axis) for axis in axes], reach, np.float32)
         for part in self._parts:
             for primitive in part.primitives:
-                placed = Placed.build(part, primitive)
+                placed = PlacedPrimitive.build(part, primitive)
                 for number, center in enumerate(placed.shift):
                     half = np.abs(placed.linear[number]) @ placed.extent + np.float32(reach)
                     near = tuple(
@@ -72,7 +78,7 @@ class Occlusion:
         return lows.astype(np.float32), lattice
 
     def __call__(self, points: NDArray[np.float32], normals: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Openness [N] at points [3,N] with unit normals [3,N], both as modelled."""
+        """Openness [N] at points [3,N] with unit normals [3,N], both as modeled."""
         openness = np.ones(points.shape[1], np.float32)
         for height, weight in self.taps:
             distance = self.distance(points + np.float32(height) * normals)
@@ -81,7 +87,7 @@ class Occlusion:
 
     @property
     def reach(self) -> float:
-        """The largest distance that is known; `distance` is no larger."""
+        """Largest stored distance; `distance` is no larger."""
         return self.taps[-1][0] + self.spacing
 
     @property
@@ -92,14 +98,14 @@ class Occlusion:
         return np.stack([origin, origin + np.float32(self.spacing) * size])
 
     def distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Distance [N] of points [3,N] to the nearest surface as modelled, up to `reach`."""
+        """Distance [N] of points [3,N] to the nearest surface as modeled, up to `reach`."""
         distance = self.distance_to_parts(points)
-        if self._around is not None:
-            np.minimum(distance, self._around.distance(points), out=distance)
+        if self._enclosing is not None:
+            np.minimum(distance, self._enclosing.distance(points), out=distance)
         return distance
 
     def distance_to_parts(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The same without what is around the parts."""
+        """Distance [N] of points [3,N] to the nearest part, without the enclosing surface, up to `reach`."""
         origin, lattice = self._lattice
         at = (points - origin[:, None]) / np.float32(self.spacing)
         distance: NDArray[np.float32] = map_coordinates(lattice, at, order=1, mode="nearest")

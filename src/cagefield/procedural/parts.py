@@ -1,7 +1,7 @@
-"""Primitives and parts: textured shapes, where they stand, and how they moved.
+"""Primitives and parts: textured shapes, their placement, and their motion.
 
 A part is a list of primitives; a primitive is a shape with a texture, placed once or many times. `motion`
-[4,4] takes a part from where it was modelled to where it is now; texture and occlusion travel with it.
+[4,4] takes a part from its place as modeled to its present place; texture and occlusion travel with it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from cagefield.procedural.textures import Texture
 from cagefield.typing import Array, Float32, Int
 
 
-def affine(
+def affine_matrix(
     at: ArrayLike = (0, 0, 0),
     rotate: ArrayLike = (0, 0, 0),
     scale: ArrayLike = 1.0,
@@ -33,19 +33,21 @@ def affine(
     return matrix
 
 
-def place(at: ArrayLike = (0, 0, 0), rotate_deg: ArrayLike = (0, 0, 0), scale: ArrayLike = 1.0) -> Array:
-    """Matrix [4,4] that puts a primitive's frame at a point, turned (degrees) and scaled."""
-    return affine(at, np.radians(rotate_deg), scale)
+def pose_matrix(
+    at: ArrayLike = (0, 0, 0), rotate_deg: ArrayLike = (0, 0, 0), scale: ArrayLike = 1.0
+) -> Array:
+    """Matrix [4,4] that places a primitive's frame at a point, rotated (degrees) and scaled."""
+    return affine_matrix(at, np.radians(rotate_deg), scale)
 
 
 @dataclass(frozen=True)
 class Primitive:
-    """A textured shape, placed by poses [K,4,4] (its own frame to the scene as modelled).
+    """Textured shape, placed by poses [K,4,4] (from its own frame to the scene as modeled).
 
-    gloss: strength and exponent of the highlight; keep the exponent low, SH colour is smooth.
-    luminous: factor of the texture where that is what the surface sends out, whatever light falls on it; 0
-    for a surface that is lit. mirror: share that the top face (+z of its own frame) reflects at right
-    angles, more where it is seen at a slant; 0 for none.
+    gloss: strength and exponent of the highlight; keep the exponent low, since the color in spherical
+    harmonics is smooth. luminous: factor of the texture for a surface that emits it independently of the
+    light; 0 for a lit surface. mirror: reflectance of the top face (+z of its own frame) at right angles,
+    higher at a slant; 0 for none.
     """
 
     shape: Shape
@@ -76,7 +78,7 @@ class Part:
 
     @cached_property
     def bounds(self) -> Array:
-        """Box [2,3] that holds the part where it is now; exact up to the boxes of its primitives."""
+        """Box [2,3] that holds the part in its present place; exact up to the boxes of its primitives."""
         lows, highs = [], []
         for primitive in self.primitives:
             poses = self.motion @ primitive.poses
@@ -85,15 +87,15 @@ class Part:
             highs.append((poses[:, :3, 3] + reach).max(0))
         return np.stack([np.min(lows, 0), np.max(highs, 0)])
 
-    def settled(self) -> Part:
-        """The part as if modelled where it is now: its motion is in its primitives' poses."""
+    def with_baked_motion(self) -> Part:
+        """Part as if modeled in its present place: its motion is in its primitives' poses."""
         primitives = tuple(replace(item, poses=self.motion @ item.poses) for item in self.primitives)
         return replace(self, primitives=primitives, motion=np.eye(4))
 
 
 @dataclass(frozen=True)
-class Placed:
-    """A primitive where it is now, in float32: world = linear [K,3,3] @ local + shift [K,3].
+class PlacedPrimitive:
+    """Primitive in its present place, in float32: world = linear [K,3,3] @ local + shift [K,3].
 
     extent [3] local half size; radii [K] of the balls about shift that hold the instances; scale [K] the mean
     magnification; stretched: some instance is scaled differently along different axes.
@@ -110,7 +112,7 @@ class Placed:
     stretched: bool
 
     @classmethod
-    def build(cls, part: Part, primitive: Primitive) -> Placed:
+    def build(cls, part: Part, primitive: Primitive) -> PlacedPrimitive:
         poses = part.motion @ primitive.poses
         linear, shift = poses[:, :3, :3], poses[:, :3, 3]
         extent = np.array(primitive.shape.extent)
@@ -131,22 +133,23 @@ class Placed:
         )
 
     def local(self, points: Float32, instance: Int) -> Float32:
-        """Points [3,N] of the world in the frame of their instance [N]."""
+        """World points [3,N] in the frame of their instance [N]."""
         if len(self.shift) == 1:
-            return apply(self.inverse[0], points - self.shift[0][:, None])
+            return transform_vectors(self.inverse[0], points - self.shift[0][:, None])
         return self.local_vectors(points - self.shift.T[:, instance], instance)
 
     def local_vectors(self, vectors: Float32, instance: Int) -> Float32:
-        """Vectors [3,N] of the world in the frame of their instance [N]."""
+        """World vectors [3,N] in the frame of their instance [N]."""
         if len(self.shift) == 1:
-            return apply(self.inverse[0], vectors)
+            return transform_vectors(self.inverse[0], vectors)
         return _products(self.inverse, instance, vectors)
 
     def distance(self, points: Float32, instance: Int) -> Float32:
-        """Distance [N] of points [3,N] of the world to their instance [N]; to first order where stretched.
+        """Distance [N] of world points [3,N] to their instance [N]; to first order where stretched.
 
-        That is the local distance over the length of its gradient in the world, exact along the axes of a
-        stretched ball and near every surface; but no less than to the ball around the instance.
+        For stretched primitives it is the local distance over the length of its gradient in the world, exact
+        along the axes of a stretched ball and near every surface; but no less than the distance to the ball
+        around the instance.
         """
         local = self.local(points, instance)
         distance = self.primitive.shape.distance(local)
@@ -167,23 +170,24 @@ class Placed:
         return gradient / (4 * step)
 
     def world_gradient(self, gradient: Float32, instance: Int) -> Float32:
-        """Gradients [3,N] taken in the local frame as gradients in the world: A^-T g."""
+        """World gradients [3,N] of gradients taken in the local frame: A^-T g."""
         if len(self.shift) == 1:
-            return apply(self.inverse[0].T, gradient)
+            return transform_vectors(self.inverse[0].T, gradient)
         return _products(self.inverse.transpose(0, 2, 1), instance, gradient)
 
 
-def apply(matrix: NDArray[Any], vectors: Float32) -> Float32:
-    """matrix [3,3] @ vectors [3,N] in float32.
+def transform_vectors(matrix: NDArray[Any], vectors: Float32) -> Float32:
+    """Product matrix [3,3] @ vectors [3,N] in float32.
 
-    Not with `@`: BLAS starts threads for it, which takes twenty times longer on a machine with other work.
+    Computed without `@`: BLAS starts threads for it, which takes twenty times longer on a machine with other
+    work.
     """
     product: Float32 = np.einsum("ij,jn->in", matrix.astype(np.float32), vectors)
     return product
 
 
 def _products(matrices: Float32, instance: Int, vectors: Float32) -> Float32:
-    """matrices[instance] @ vectors for vectors [3,N]."""
+    """Products matrices[instance] @ vectors [3,N]."""
     out = np.empty_like(vectors)
     for row in range(3):
         out[row] = sum(matrices[:, row, column][instance] * vectors[column] for column in range(3))

@@ -17,39 +17,41 @@ from cagefield.cameras.camera import Camera
 from cagefield.errors import SceneError
 from cagefield.images.render_result import Background, RenderResult
 from cagefield.procedural.occlusion import Occlusion
-from cagefield.procedural.parts import Part, Placed, affine
+from cagefield.procedural.parts import Part, PlacedPrimitive, affine_matrix
 from cagefield.procedural.room_light import Room, RoomLight
 from cagefield.procedural.shading import Light, shade
 from cagefield.procedural.supersampling import photograph
-from cagefield.procedural.surfaces import SHELL, SurfaceField, surface
-from cagefield.procedural.tracing import Hits, along, trace
+from cagefield.procedural.surfaces import SHELL_EXTENT_EPS, SurfaceField, shade_surface
+from cagefield.procedural.tracing import Hits, points_along_rays, trace
 from cagefield.typing import Array, Float32
 
 
 @dataclass(frozen=True)
 class ProceduralScene:
-    """Named parts, where they are, and how they are lit; every change returns a new scene.
+    """Named parts with their placement and lighting; every change returns a new scene.
 
-    modelled  the parts as first built: baked occlusion is theirs, whatever moves later
-    relit     True: a turned part is lit anew, as in the world. False: a part carries its colours like an
-              edited radiance field, colour(p, d) = modelled colour(canonical point, canonical direction).
+    modeled   the parts as first built: baked occlusion is theirs, whatever moves later
+    relit     True: a rotated part is lit anew, as in the world. False: a part carries its colors like an
+              edited radiance field, color(p, d) = modeled color(canonical point, canonical direction).
     lowest    elevation in degrees of the lowest camera that make_scene places
-    room      the room that the parts stand in, whose walls are parts too, and whose window lights them
+    room      the room around the parts, whose walls are parts too, and whose window lights them
     """
 
     name: str
     parts: tuple[Part, ...]
-    modelled: tuple[Part, ...] = ()
+    modeled: tuple[Part, ...] = ()
     relit: bool = True
     lowest: float = 5.0
     room: Room | None = None
 
     def __post_init__(self) -> None:
         names = [part.name for part in self.parts]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise SceneError(f"part names must differ; {', '.join(twice)} is used twice in scene {self.name}")
-        if not self.modelled:
+        duplicates = sorted({name for name in names if names.count(name) > 1})
+        if duplicates:
+            raise SceneError(
+                f"part names must differ; {', '.join(duplicates)} is used twice in scene {self.name}"
+            )
+        if not self.modeled:
             object.__setattr__(self, "modelled", self.parts)
 
     @property
@@ -63,7 +65,7 @@ class ProceduralScene:
         return np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
 
     def part_bounds(self, part: str | Sequence[str]) -> Array:
-        """Box [2,3] that holds a part, or several parts, where they are now."""
+        """Box [2,3] that holds a part, or several parts, in their present place."""
         boxes = np.stack([self.parts[i].bounds for i in self._indices(part)])
         return np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
 
@@ -83,8 +85,8 @@ class ProceduralScene:
     ) -> ProceduralScene:
         """Scene whose part (or parts, together) went p -> pivot + translate + R S (p - pivot).
 
-        rotate in radians, intrinsic XYZ; scale a number or one per world axis; pivot defaults to the centre
-        of part_bounds, where a cage around the part has its centre. Raises SceneError for unknown parts and
+        rotate in radians, intrinsic XYZ; scale a number or one per world axis; pivot defaults to the center
+        of part_bounds, where a cage around the part has its center. Raises SceneError for unknown parts and
         for scales that are not positive.
         """
         moved = self._motion(part, translate, rotate, scale, pivot)
@@ -119,33 +121,35 @@ class ProceduralScene:
         return self._with((*self.parts, *copies))
 
     def with_parts(self, parts: Sequence[Part]) -> ProceduralScene:
-        """Other parts alone, in the light of this scene, whose shadows and occlusion stay as modelled."""
+        """Scene of other parts alone, in the light of this scene, whose shadows and occlusion stay as
+        modeled.
+        """
         return self._with(parts)
 
-    def lit_by(self, light: Light) -> ProceduralScene:
-        """This scene in another light."""
-        scene = self._lit_alike(replace(self))
+    def with_light(self, light: Light) -> ProceduralScene:
+        """Scene in another light."""
+        scene = self._share_light(replace(self))
         scene.__dict__["light"] = light
         return scene
 
-    def carrying_light(self) -> ProceduralScene:
-        """This scene with `relit` False: moved parts keep the colours they had as modelled."""
-        return self._lit_alike(replace(self, relit=False))
+    def with_modeled_light(self) -> ProceduralScene:
+        """Scene with `relit` False: moved parts keep the colors they had as modeled."""
+        return self._share_light(replace(self, relit=False))
 
-    def with_its_own_occlusion(self) -> ProceduralScene:
-        """This scene as if modelled with its parts where they are now: ambient occlusion is theirs there.
+    def with_new_occlusion(self) -> ProceduralScene:
+        """Scene as if modeled with its parts in their present place, which determine the ambient occlusion.
 
-        So are the shadows in a room. What no part came near or left looks as it did.
+        The shadows in a room follow, too. Surfaces that no part approached or left look as before.
         """
-        parts = tuple(part.settled() for part in self.parts)
-        scene = replace(self, parts=parts, modelled=parts)
-        scene.__dict__["occlusion"] = scene._occlusion(beside=self.occlusion)
+        parts = tuple(part.with_baked_motion() for part in self.parts)
+        scene = replace(self, parts=parts, modeled=parts)
+        scene.__dict__["occlusion"] = scene._occlusion(aligned_with=self.occlusion)
         return scene
 
     def photograph(
         self, camera: Camera, *, supersample: int = 2, background: Background = "none"
     ) -> RenderResult:
-        """Frame of the surfaces, as `supersampling.photograph` makes it."""
+        """Image of the surfaces, as `supersampling.photograph` renders it."""
         return photograph(self.shoot, camera, supersample=supersample, background=background)
 
     def shoot(
@@ -153,16 +157,17 @@ class ProceduralScene:
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], Hits]:
         """(rgb [N,3], normals [N,3], hits) of rays from one origin [3] with unit directions [3,N]."""
         hits = trace(self.placed, origin, directions)
-        rgb, normals = self.colours(hits, along(origin, directions, hits.t), directions)
+        rgb, normals = self.colors(hits, points_along_rays(origin, directions, hits.t), directions)
         for index, item in enumerate(self.placed):
             if item.primitive.mirror:
                 self._reflect(index, hits, origin, directions, rgb, normals)
         return rgb, normals, hits
 
-    def colours(
-        self, hits: Hits, points: Float32, viewdirs: Float32, placed: Sequence[Placed] | None = None
+    def colors(
+        self, hits: Hits, points: Float32, viewdirs: Float32, placed: Sequence[PlacedPrimitive] | None = None
     ) -> tuple[Float32, Float32]:
-        """(rgb [N,3], normals [N,3]) of hits at points [3,N] seen in directions [3,N], 0 where none was hit.
+        """(rgb [N,3], normals [N,3]) of hits at points [3,N] seen in directions [3,N], 0 where no surface was
+        hit.
 
         The hits are of `placed`, all primitives where it is left out. Nothing is reflected.
         """
@@ -170,7 +175,7 @@ class ProceduralScene:
         for index, item in enumerate(self.placed if placed is None else placed):
             rows = np.flatnonzero(hits.primitive == index)
             if len(rows):
-                rgb[rows], normals[rows] = surface(
+                rgb[rows], normals[rows] = shade_surface(
                     item,
                     points[:, rows],
                     hits.instance[rows],
@@ -190,11 +195,11 @@ class ProceduralScene:
         rgb: NDArray[np.float32],
         normals: NDArray[np.float32],
     ) -> None:
-        """Adds to `rgb` [N,3] what the top face of a polished primitive reflects, once.
+        """Add to `rgb` [N,3] the single reflection in the top face of a polished primitive.
 
         The face is a plane, so that the reflected rays all come from the camera's mirror image. The share of
-        the reflection is F = m + (1 - m) (1 - cos)^5, m the primitive's `mirror`.
-        Source: Schlick, "An inexpensive BRDF model for physically-based rendering" (1994), equation 15.
+        the reflection is F = m + (1 - m) (1 - cos)^5, m the primitive's `mirror`. Source: Schlick, "An
+        inexpensive BRDF model for physically-based rendering" (1994), equation 15.
         """
         item = self.placed[index]
         up = item.linear[0, :, 2].astype(np.float64)
@@ -208,30 +213,32 @@ class ProceduralScene:
         cosine = up.astype(np.float32) @ directions[:, rows]
         mirrored = directions[:, rows] - 2 * cosine * up.astype(np.float32)[:, None]
         others = self.placed[:index] + self.placed[index + 1 :]
-        found = trace(others, image, mirrored, hits.t[rows])
-        reflected, _ = self.colours(found, along(image, mirrored, found.t), mirrored, others)
+        hits_behind = trace(others, image, mirrored, hits.t[rows])
+        reflected, _ = self.colors(
+            hits_behind, points_along_rays(image, mirrored, hits_behind.t), mirrored, others
+        )
         base = np.float32(item.primitive.mirror)
         share = (base + (1 - base) * (1 - np.abs(cosine)) ** 5)[:, None]
         rgb[rows] = rgb[rows] * (1 - share) + share * reflected
 
     def field(self, eps: float = 0.004) -> SurfaceField:
-        """This scene as a radiance field whose surfaces are about `eps` (world units) soft."""
+        """Radiance field of the scene whose surfaces are about `eps` (world units) soft."""
         if not 0 < eps < np.inf:
             raise SceneError(f"eps must be positive, not {eps}")
-        reach = SHELL * eps
+        reach = SHELL_EXTENT_EPS * eps
         low, high = self.bounds
         bounds = np.stack([low - reach, high + reach])
         return SurfaceField(self.placed, self.occlusion, self.relit, eps, bounds, self.light)
 
     def _indices(self, part: str | Sequence[str]) -> tuple[int, ...]:
-        wanted = (part,) if isinstance(part, str) else tuple(part)
-        unknown = [name for name in wanted if name not in self.part_names]
-        if unknown or not wanted:
+        names = (part,) if isinstance(part, str) else tuple(part)
+        unknown = [name for name in names if name not in self.part_names]
+        if unknown or not names:
             raise SceneError(
                 f"scene {self.name} has no part {', '.join(map(repr, unknown)) or '()'}; "
                 f"its parts are {', '.join(self.part_names)}"
             )
-        return tuple(self.part_names.index(name) for name in wanted)
+        return tuple(self.part_names.index(name) for name in names)
 
     def _motion(
         self, part: str | Sequence[str], translate: Any, rotate: Any, scale: Any, pivot: Any
@@ -240,33 +247,35 @@ class ProceduralScene:
         if factors.shape not in ((), (3,)) or not (np.isfinite(factors).all() and (factors > 0).all()):
             raise SceneError(f"scale must be positive, one number or three, not {scale!r}")
         center = self.part_bounds(part).mean(0) if pivot is None else pivot
-        return affine(translate, rotate, factors, center)
+        return affine_matrix(translate, rotate, factors, center)
 
     def _with(self, parts: Iterable[Part]) -> ProceduralScene:
-        return self._lit_alike(replace(self, parts=tuple(parts)))
+        return self._share_light(replace(self, parts=tuple(parts)))
 
-    def _lit_alike(self, scene: ProceduralScene) -> ProceduralScene:
-        """A scene of the same modelled parts, with which it shares what light those get."""
+    def _share_light(self, scene: ProceduralScene) -> ProceduralScene:
+        """Scene of the same modeled parts, which gets this scene's occlusion and light."""
         scene.__dict__["occlusion"], scene.__dict__["light"] = self.occlusion, self.light
         return scene
 
     @cached_property
-    def placed(self) -> tuple[Placed, ...]:
-        """All primitives where they are now."""
-        return tuple(Placed.build(part, primitive) for part in self.parts for primitive in part.primitives)
+    def placed(self) -> tuple[PlacedPrimitive, ...]:
+        """All primitives in their present place."""
+        return tuple(
+            PlacedPrimitive.build(part, primitive) for part in self.parts for primitive in part.primitives
+        )
 
     @cached_property
     def occlusion(self) -> Occlusion:
-        """Baked occlusion of the scene as modelled (computed on first use)."""
+        """Baked occlusion of the scene as modeled (computed on first use)."""
         return self._occlusion()
 
-    def _occlusion(self, beside: Occlusion | None = None) -> Occlusion:
+    def _occlusion(self, aligned_with: Occlusion | None = None) -> Occlusion:
         if self.room is None:
-            return Occlusion(self.modelled, beside=beside)
-        parts = self.room.furniture(self.modelled)
-        return Occlusion(parts, self.room, self.room.detail, beside=beside)
+            return Occlusion(self.modeled, aligned_with=aligned_with)
+        parts = self.room.furniture(self.modeled)
+        return Occlusion(parts, self.room, self.room.detail, aligned_with=aligned_with)
 
     @cached_property
     def light(self) -> Light:
-        """The light that falls on the scene as modelled."""
+        """Light that falls on the scene as modeled."""
         return shade if self.room is None else RoomLight(self.room, self.occlusion)

@@ -238,7 +238,7 @@ class Leaf:
     def distance(self, points: Float32) -> Float32:
         x, y = np.abs(points[0]), np.abs(points[1])
         z = points[2] + np.float32(self.bend) * x * x
-        # the outline is where two discs of radius r overlap, their centres at y = -offset and y = offset
+        # the outline is where two discs of radius r overlap, their centers at y = -offset and y = offset
         a, b = self.length / 2, self.width / 2
         offset = (a * a - b * b) / (2 * b)
         radius = offset + b

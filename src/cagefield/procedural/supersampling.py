@@ -1,4 +1,4 @@
-"""Photographs from rays: each pixel is the mean of several."""
+"""Supersampled photographs: each pixel is the mean of several rays."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cagefield.cameras.camera import Camera
 from cagefield.errors import SceneError
 from cagefield.images.render_result import Background, RenderResult
-from cagefield.procedural.parts import apply
+from cagefield.procedural.parts import transform_vectors
 from cagefield.procedural.tracing import Hits
 from cagefield.typing import Array, Float32
 
@@ -19,16 +19,16 @@ Shoot = Callable[[Array, Float32], tuple[Float32, Float32, Hits]]
 
 
 def photograph(shoot: Shoot, camera: Camera, *, supersample: int, background: Background) -> RenderResult:
-    """Frame of the surfaces that rays meet, each pixel the mean of supersample^2 rays.
+    """Image of the surfaces that rays meet, each pixel the mean of supersample^2 rays.
 
-    opacity is the share of rays that meet a surface, depth and normals the means over those.
-    Raises SceneError for supersample < 1.
+    opacity is the share of rays that meet a surface, depth and normals the means over these rays. Raises
+    SceneError for supersample < 1.
     """
     if supersample < 1:
         raise SceneError(f"supersample must be at least 1, not {supersample}")
     height, width = camera.height, camera.width
     fine = camera if supersample == 1 else camera.resized(width * supersample, height * supersample)
-    directions = apply(camera.c2w[:3, :3], fine.local_directions().T)
+    directions = transform_vectors(camera.c2w[:3, :3], fine.local_directions().T)
     rgb, normals, hits = shoot(camera.origin, directions)
     seen = np.isfinite(hits.t)
 

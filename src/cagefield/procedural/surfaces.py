@@ -1,4 +1,4 @@
-"""Colours and normals of points on the surface of a procedural scene, and the scene as a radiance field."""
+"""Colors and normals of points on the surface of a procedural scene, and the scene as a radiance field."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.procedural.parts import Placed, apply
+from cagefield.procedural.parts import PlacedPrimitive, transform_vectors
 from cagefield.procedural.shading import Light, shade
 from cagefield.typing import Float32, Int
 
 Openness = Callable[[Float32, Float32], Float32]
 
-DEPTH = 2.0
+SHELL_START_EPS = 2.0
 """Depth in units of eps at which a field's shell starts: less, and outlines grow; more, and faces sink in."""
 
-SHELL = 6.0
-"""Distance in units of eps past which a field's sigma is negligible: sigmoid(-SHELL - DEPTH) = 3e-4."""
+SHELL_EXTENT_EPS = 6.0
+"""Distance in units of eps past which a field's sigma is negligible: sigmoid(-6 - SHELL_START_EPS) = 3e-4."""
 
 
 def _unit(vectors: Float32) -> Float32:
@@ -27,8 +27,8 @@ def _unit(vectors: Float32) -> Float32:
     return vectors / np.maximum(length, np.float32(1e-12))
 
 
-def surface(
-    item: Placed,
+def shade_surface(
+    item: PlacedPrimitive,
     points: Float32,
     instance: Int,
     viewdirs: Float32,
@@ -39,26 +39,26 @@ def surface(
 ) -> tuple[Float32, Float32]:
     """(rgb [N,3], unit world normals [N,3]) of points [3,N] on the surface of one placed primitive.
 
-    viewdirs [3,N]; openness maps modelled points and normals [3,N] to occlusion.
+    viewdirs [3,N]; openness maps modeled points and normals [3,N] to occlusion.
     """
     local = item.local(points, instance)
     normals = _unit(item.world_gradient(item.local_gradient(local, instance), instance))
     motion = item.part.motion
-    modelled_points, modelled_normals, modelled_dirs = points, normals, viewdirs
+    modeled_points, modeled_normals, modeled_dirs = points, normals, viewdirs
     if not np.array_equal(motion, np.eye(4)):
         inverse = np.linalg.inv(motion)
-        modelled_points = apply(inverse[:3, :3], points) + inverse[:3, 3:].astype(np.float32)
-        modelled_normals = _unit(apply(motion[:3, :3].T, normals))
-        modelled_dirs = _unit(apply(inverse[:3, :3], viewdirs))
+        modeled_points = transform_vectors(inverse[:3, :3], points) + inverse[:3, 3:].astype(np.float32)
+        modeled_normals = _unit(transform_vectors(motion[:3, :3].T, normals))
+        modeled_dirs = _unit(transform_vectors(inverse[:3, :3], viewdirs))
     albedo = item.primitive.texture(local.T, instance)
     if item.primitive.luminous:
         return albedo * np.float32(item.primitive.luminous), normals.T
     rgb = light(
         albedo,
-        modelled_points,
-        normals if relit else modelled_normals,
-        viewdirs if relit else modelled_dirs,
-        occlusion=openness(modelled_points, modelled_normals),
+        modeled_points,
+        normals if relit else modeled_normals,
+        viewdirs if relit else modeled_dirs,
+        occlusion=openness(modeled_points, modeled_normals),
         gloss=item.primitive.gloss,
     )
     return rgb, normals.T
@@ -66,13 +66,13 @@ def surface(
 
 @dataclass(frozen=True)
 class SurfaceField:
-    """Radiance field of solid surfaces: sigma = sigmoid(-distance / eps - DEPTH) / (eps ln 2).
+    """Radiance field of solid surfaces: sigma = sigmoid(-distance / eps - SHELL_START_EPS) / (eps ln 2).
 
-    The optical depth from open space is 1 at DEPTH * eps below a flat surface. Distances are
-    Euclidean for parts that were scaled alike on all axes, accurate to first order for the others.
+    The optical depth from open space is 1 at SHELL_START_EPS * eps below a flat surface. Distances are
+    Euclidean for parts that were scaled uniformly, accurate to first order for the others.
     """
 
-    placed: tuple[Placed, ...]
+    placed: tuple[PlacedPrimitive, ...]
     openness: Openness
     relit: bool
     eps: float
@@ -80,17 +80,19 @@ class SurfaceField:
     light: Light = shade
 
     def __call__(self, positions: NDArray[Any], viewdirs: NDArray[Any]) -> tuple[Float32, Float32]:
-        """(sigma [N], rgb [N,3]); rgb is 0 further than SHELL * eps from all surfaces."""
+        """(sigma [N], rgb [N,3]); rgb is 0 further than SHELL_EXTENT_EPS * eps from all surfaces."""
         points = np.ascontiguousarray(positions, np.float32)
         distance, owner, instance = self.distance(points)
         with np.errstate(over="ignore"):
             sigma = (
-                1 / (1 + np.exp(distance / np.float32(self.eps) + DEPTH)) / np.float32(self.eps * np.log(2))
+                1
+                / (1 + np.exp(distance / np.float32(self.eps) + SHELL_START_EPS))
+                / np.float32(self.eps * np.log(2))
             )
         rgb = np.zeros((len(points), 3), np.float32)
         for index in np.unique(owner[owner >= 0]):
             rows = np.flatnonzero(owner == index)
-            rgb[rows], _ = surface(
+            rgb[rows], _ = shade_surface(
                 self.placed[index],
                 np.ascontiguousarray(points[rows].T),
                 instance[rows],
@@ -102,8 +104,10 @@ class SurfaceField:
         return sigma, rgb
 
     def distance(self, points: Float32) -> tuple[Float32, Int, Int]:
-        """(signed distance [N], nearest primitive, its instance); inf and -1 beyond SHELL * eps."""
-        reach = np.float32(SHELL * self.eps)
+        """(signed distance [N], nearest primitive, its instance); inf and -1 beyond SHELL_EXTENT_EPS *
+        eps.
+        """
+        reach = np.float32(SHELL_EXTENT_EPS * self.eps)
         distance = np.full(len(points), np.inf, np.float32)
         owner, which = np.full(len(points), -1, np.intp), np.zeros(len(points), np.intp)
         part_rows: dict[str, Int] = {}
@@ -117,12 +121,12 @@ class SurfaceField:
             rows, instance, gap = rows[near], instance[near], gap[near]
             before = distance[rows]
             np.minimum.at(distance, rows, gap)
-            wins = (distance[rows] == gap) & (gap < before)
-            owner[rows[wins]], which[rows[wins]] = index, instance[wins]
+            is_nearest = (distance[rows] == gap) & (gap < before)
+            owner[rows[is_nearest]], which[rows[is_nearest]] = index, instance[is_nearest]
         return distance, owner, which
 
 
-def _candidates(item: Placed, points: Float32, rows: Int, reach: np.float32) -> tuple[Int, Int]:
+def _candidates(item: PlacedPrimitive, points: Float32, rows: Int, reach: np.float32) -> tuple[Int, Int]:
     """(rows of points, instances) whose ball, grown by reach, holds the point."""
     kept_rows, kept_instances = [], []
     for instance, (center, radius) in enumerate(zip(item.shift, item.radii, strict=True)):

@@ -1,7 +1,7 @@
-"""Procedural colours over a primitive's own frame: (points [N,3], instance [N]) -> rgb [N,3], float32.
+"""Procedural colors over a primitive's own frame: (points [N,3], instance [N]) -> rgb [N,3], float32.
 
-Patterns are soft-edged, a few pixels wide at 200x200 from distance 4, so that photos neither alias nor exceed
-what a voxel field of ordinary size can hold. Colours are sRGB-encoded.
+Patterns are soft-edged, a few pixels wide at 200x200 from distance 4, so that photos do not alias and a voxel
+field of ordinary size can represent them. Colors are sRGB-encoded.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from cagefield.typing import Float32
 Rgb = tuple[float, float, float]
 Vector = tuple[float, float, float]
 
-NOISE_SIZE = 64
+NOISE_SIZE_VOXELS = 64
 
 
 class Texture(Protocol):
-    """Colour of points of one primitive; `instance` numbers its placements."""
+    """Color of points of one primitive; `instance` numbers its placements."""
 
     def __call__(self, points: Float32, instance: NDArray[np.intp]) -> Float32: ...
 
 
-def hexcolor(code: str) -> Rgb:
+def rgb_from_hex(code: str) -> Rgb:
     """rgb in [0,1] of "#rrggbb"."""
     value = int(code.lstrip("#"), 16)
     return (value >> 16) / 255, (value >> 8 & 255) / 255, (value & 255) / 255
@@ -37,7 +37,7 @@ def hexcolor(code: str) -> Rgb:
 @lru_cache(maxsize=1)
 def _noise_volume() -> Float32:
     """Periodic fractal noise [S,S,S] with mean 0 and deviation 1: a spectrum 1/f^2 up to 12 cycles."""
-    size = NOISE_SIZE
+    size = NOISE_SIZE_VOXELS
     white = np.random.RandomState(7).standard_normal((size, size, size))
     wave = np.fft.fftfreq(size, 1 / size)
     frequency = np.sqrt(wave[:, None, None] ** 2 + wave[:, None] ** 2 + wave[: size // 2 + 1] ** 2)
@@ -48,7 +48,7 @@ def _noise_volume() -> Float32:
 
 def noise(points: Float32, scale: float) -> Float32:
     """Smooth noise [N], mean 0, deviation 1, with features of about `scale` and down to a quarter of it."""
-    lattice = points.T * np.float32(NOISE_SIZE / (8 * scale))
+    lattice = points.T * np.float32(NOISE_SIZE_VOXELS / (8 * scale))
     sampled: Float32 = map_coordinates(_noise_volume(), lattice, order=1, mode="grid-wrap")
     return sampled
 
@@ -60,13 +60,13 @@ def _mix(first: Rgb, second: Rgb, share: Float32) -> Float32:
 
 def _soft_square(phase: Float32, duty: float, soft: float) -> Float32:
     """Square wave of period 1 in [0,1], high for `duty` of it, with ramps of width `soft`."""
-    centred = np.abs(phase - np.round(phase))
-    return np.clip((duty / 2 - centred) / soft + 0.5, 0, 1).astype(np.float32)
+    centered = np.abs(phase - np.round(phase))
+    return np.clip((duty / 2 - centered) / soft + 0.5, 0, 1).astype(np.float32)
 
 
 @dataclass(frozen=True)
 class Plain:
-    """One colour with faint noise, each instance a shade lighter or darker by up to `variety`."""
+    """One color with faint noise, each instance a shade lighter or darker by up to `variety`."""
 
     color: Rgb
     grain: float = 0.04
@@ -82,7 +82,7 @@ class Plain:
 
 @dataclass(frozen=True)
 class Mottled:
-    """Two colours mixed by noise; `contrast` sharpens the border between them."""
+    """Two colors mixed by noise; `contrast` sharpens the border between them."""
 
     first: Rgb
     second: Rgb
@@ -199,7 +199,7 @@ class Wood:
 
 @dataclass(frozen=True)
 class Rosette:
-    """Petals around z: `second` in `count` sectors that fade towards the centre and past `radius`."""
+    """Petals around z: `second` in `count` sectors that fade towards the center and past `radius`."""
 
     first: Rgb
     second: Rgb
@@ -304,7 +304,7 @@ class Zigzag:
 
 @dataclass(frozen=True)
 class Ramp:
-    """Colours that run from `first` to `second` while a coordinate runs from `low` to `high`."""
+    """Color gradient from `first` to `second` while a coordinate runs from `low` to `high`."""
 
     first: Rgb
     second: Rgb

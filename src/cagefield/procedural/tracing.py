@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.procedural.parts import Placed
+from cagefield.procedural.parts import PlacedPrimitive
 from cagefield.procedural.shapes import Shape
 from cagefield.typing import Float32, Int
 
-TOLERANCE = 2e-4
-"""World distance at which a ray has arrived: a thirtieth of a pixel of a 400x400 view from distance 4."""
+HIT_TOLERANCE = 2e-4
+"""World distance at which a ray hits: a thirtieth of a pixel of a 400x400 view from distance 4."""
 
 MAX_STEPS = 96
 
@@ -32,7 +32,7 @@ class Hits:
     instance: Int
 
 
-def along(origin: NDArray[np.float64], directions: Float32, t: Float32) -> Float32:
+def points_along_rays(origin: NDArray[np.float64], directions: Float32, t: Float32) -> Float32:
     """Points [3,N] at distances t [N] along rays from one origin [3], the origin where t is inf."""
     reached: Float32 = np.where(np.isfinite(t), t, np.float32(0)) * directions
     reached += np.asarray(origin, np.float32)[:, None]
@@ -40,7 +40,7 @@ def along(origin: NDArray[np.float64], directions: Float32, t: Float32) -> Float
 
 
 def trace(
-    placed: Sequence[Placed],
+    placed: Sequence[PlacedPrimitive],
     origin: NDArray[np.float64],
     directions: Float32,
     beyond: Float32 | None = None,
@@ -53,7 +53,7 @@ def trace(
     hits = Hits(np.full(count, np.inf, np.float32), np.full(count, -1, np.intp), np.zeros(count, np.intp))
     start = np.asarray(origin, np.float32)
     bundles: dict[str, tuple[Int, Float32]] = {}
-    # near primitives first: what they hide is never traced
+    # near primitives first: surfaces behind them are never traced
     order = sorted(
         range(len(placed)), key=lambda i: float(np.linalg.norm(placed[i].shift - start, axis=1).min())
     )
@@ -80,7 +80,7 @@ def _meets(directions: Float32, to_center: Float32, radius: np.float32) -> NDArr
 
 
 def _trace_primitive(
-    item: Placed,
+    item: PlacedPrimitive,
     index: int,
     start: Float32,
     rays: Int,
@@ -88,7 +88,7 @@ def _trace_primitive(
     hits: Hits,
     beyond: Float32 | None,
 ) -> None:
-    """Updates the hits of rays (indices [M], directions [3,M]) with one primitive's nearest surfaces."""
+    """Update the hits of rays (indices [M], directions [3,M]) with one primitive's nearest surfaces."""
     to_center = item.shift - start
     chosen = [np.flatnonzero(_meets(directions, c, r)) for c, r in zip(to_center, item.radii, strict=True)]
     instance = np.repeat(np.arange(len(chosen)), [len(c) for c in chosen])
@@ -128,7 +128,7 @@ def _march(shape: Shape, origin: Float32, direction: Float32, enter: Float32, le
     t = enter
     for _ in range(MAX_STEPS):
         step = shape.distance(origin + t * direction) * pace
-        arrived = step < TOLERANCE
+        arrived = step < HIT_TOLERANCE
         found[active[arrived]] = t[arrived]
         t = t + step
         going = np.flatnonzero(~arrived & (t < leave))

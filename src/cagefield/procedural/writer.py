@@ -22,16 +22,16 @@ from cagefield.files.atomic import recover_folder, replaced_folder
 from cagefield.files.safe_open import real_path
 from cagefield.images.image_files import write_png
 from cagefield.images.render_result import RenderResult
-from cagefield.procedural.catalogue import procedural_scene
+from cagefield.procedural.builtin_scenes import procedural_scene
 from cagefield.procedural.scene import ProceduralScene
 
-FOV_X = 0.6911112
-RADIUS = 4.0
-HIGHEST = 80.0
-"""Elevation of the highest camera, in degrees."""
+FOV_X_RAD = 0.6911112
+CAMERA_DISTANCE = 4.0
+MAX_ELEVATION_DEG = 80.0
+"""Elevation of the highest camera."""
 
 DepthViews = Literal["all", "test", "none"]
-"""Whose depth is written."""
+"""Splits whose depth is written."""
 
 _SPLITS = ("train", "val", "test")
 
@@ -48,21 +48,21 @@ def viewpoints(
     start = np.random.RandomState([seed, _SPLITS.index(split)]).uniform(size=2)
     steps = np.array([0.7548776662466927, 0.5698402909980532])
     fractions = np.mod(start + np.arange(count)[:, None] * steps, 1.0)
-    low, high = np.sin(np.radians([lowest, HIGHEST]))
+    low, high = np.sin(np.radians([lowest, MAX_ELEVATION_DEG]))
     cameras = []
     for azimuth, height in zip(
         2 * np.pi * fractions[:, 0], low + (high - low) * fractions[:, 1], strict=True
     ):
         ring = np.sqrt(1 - height**2)
-        eye = RADIUS * np.array([ring * np.cos(azimuth), ring * np.sin(azimuth), height])
-        cameras.append(Camera.look_at(eye, (0, 0, 0), width=size, height=size, fov_x=FOV_X))
+        eye = CAMERA_DISTANCE * np.array([ring * np.cos(azimuth), ring * np.sin(azimuth), height])
+        cameras.append(Camera.look_at(eye, (0, 0, 0), width=size, height=size, fov_x=FOV_X_RAD))
     return tuple(cameras)
 
 
-def photographs(
+def render_views(
     scene: ProceduralScene, cameras: Iterable[Camera], *, supersample: int = 2
 ) -> Iterator[RenderResult]:
-    """Frames of a scene without background, in order."""
+    """Images of a scene without background, in order."""
     for camera in cameras:
         yield scene.photograph(camera, supersample=supersample)
 
@@ -92,9 +92,9 @@ def make_scene(
     """
     scene = procedural_scene(name) if scene is None else scene
     tests = max(views // 4, 4) if test_views is None else test_views
-    for what, number in (("views", views), ("size", size), ("test_views", tests)):
+    for field, number in (("views", views), ("size", size), ("test_views", tests)):
         if number < 1:
-            raise DatasetError(f"{what} must be at least 1, not {number}")
+            raise DatasetError(f"{field} must be at least 1, not {number}")
     if depth not in get_args(DepthViews):
         raise DatasetError(f"depth must be one of {', '.join(get_args(DepthViews))}, not {depth!r}")
     target = real_path(out_dir)
@@ -108,7 +108,7 @@ def make_scene(
         for split, count in counts.items():
             cameras = viewpoints(count, size, lowest=scene.lowest, seed=seed, split=split)
             (draft / split).mkdir()
-            for index, frame in enumerate(photographs(scene, cameras)):
+            for index, frame in enumerate(render_views(scene, cameras)):
                 write_png(draft / split / f"r_{index}.png", frame.rgba8())
                 if depth in ("all", split):
                     np.save(draft / split / f"r_{index}_depth.npy", frame.depth)
@@ -128,7 +128,7 @@ def _transforms(scene: ProceduralScene, cameras: Iterable[Camera], split: str) -
     margin = 0.05
     low, high = scene.bounds
     return {
-        "camera_angle_x": FOV_X,
+        "camera_angle_x": FOV_X_RAD,
         "aabb": [(low - margin).round(4).tolist(), (high + margin).round(4).tolist()],
         "frames": frames,
     }

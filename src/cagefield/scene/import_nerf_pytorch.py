@@ -17,7 +17,13 @@ from numpy.typing import NDArray
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.datasets import Dataset
 from cagefield.datasets.llff import POSES_FILE
-from cagefield.datasets.nerf_normalization import Similarity, all_cameras, ndc_box, ndc_ratios, to_mean_camera
+from cagefield.datasets.nerf_normalization import (
+    Similarity,
+    all_cameras,
+    mean_camera_similarity,
+    ndc_box,
+    ndc_ratios,
+)
 from cagefield.errors import FieldError
 from cagefield.fields.nerf_field import NerfField
 from cagefield.formats.nerf.nerf_pytorch import Checkpoint
@@ -92,7 +98,7 @@ def _cameras(dataset: Dataset, to_field: Similarity) -> Cameras:
     """The data set's cameras in the field's world."""
     splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
     return {
-        name: tuple(shifted(to_field.camera(view.camera)) for view in views)
+        name: tuple(shifted(to_field.transform_camera(view.camera)) for view in views)
         for name, views in splits.items()
         if views
     }
@@ -104,7 +110,7 @@ def _llff_cameras(dataset: Dataset) -> Cameras:
             f"the checkpoint was trained in NDC, which needs the capture's depth bounds; {dataset.path} has "
             f"no {POSES_FILE}: give the LLFF folder it was trained on"
         )
-    return _cameras(dataset, to_mean_camera(all_cameras(dataset), dataset.depths[0]))
+    return _cameras(dataset, mean_camera_similarity(all_cameras(dataset), dataset.depths[0]))
 
 
 def _guessed_cameras(settings: SamplingSettings, fov_x: float | None) -> Cameras:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cagefield.cameras.camera import Camera, turntable
-from cagefield.datasets.transforms.transforms_json import without_scale
+from cagefield.datasets.transforms.transforms_json import remove_scale
 from cagefield.datasets.views import Dataset
 from cagefield.errors import FieldError
 from cagefield.fields.splat_field import SplatField
@@ -130,7 +130,7 @@ def _cameras(dataset: Dataset, offset: Array) -> Cameras:
     back[:3] -= offset[:, None] * back[3]
     splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
     return {
-        name: tuple(view.camera.with_c2w(without_scale(back @ view.camera.c2w)[0]) for view in views)
+        name: tuple(view.camera.with_c2w(remove_scale(back @ view.camera.c2w)[0]) for view in views)
         for name, views in splits.items()
         if views
     }

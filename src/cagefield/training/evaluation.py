@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cagefield.datasets.views import View
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.images.metrics import WINDOW, color_corrected, psnr, ssim
+from cagefield.images.metrics import SSIM_WINDOW_PIXELS, color_corrected, psnr, ssim
 from cagefield.typing import AnyArray, Float32
 
 
@@ -85,7 +85,7 @@ def evaluate_image(
     if valid is not None and not valid.any():
         return None
     image = np.clip(image, 0, 1)
-    fits = min(photo.shape[:2]) >= WINDOW
+    fits = min(photo.shape[:2]) >= SSIM_WINDOW_PIXELS
     return ViewMetrics(
         name,
         psnr(image, photo, valid),

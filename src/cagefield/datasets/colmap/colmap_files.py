@@ -1,9 +1,9 @@
-"""Whether the binary files of a COLMAP model are whole.
+"""Completeness checks of the binary files of a COLMAP model.
 
-pycolmap (4.2) does not notice the end of a binary file: from one that is cut off it reads zeros as
-intrinsics, or loops on a count it never read until memory is full. So each file is walked first, record by
-record, without decoding more than its counts. A part of the file is held at a time: one that another program
-cuts off meanwhile would end a process that has it mapped.
+pycolmap (4.2) does not notice the end of a binary file: from a truncated file it reads zeros as intrinsics,
+or loops on a count that it never read until memory is full. So each file is walked first, record by record,
+without decoding more than its counts. A window of the file is read at a time, not memory-mapped: if another
+program truncates a mapped file, the process is killed.
 
 Source: COLMAP, `src/colmap/scene/reconstruction_io_binary.cc`.
 """
@@ -22,29 +22,29 @@ from cagefield.errors import DatasetError
 from cagefield.files.safe_open import check_regular, file_state, open_regular
 from cagefield.files.temporary_folders import TemporaryFolder
 
-_POSE = 56  # rotation quaternion and translation, float64
-_PARAMETERS = tuple(PARAMETERS.values())
+_POSE_BYTES = 56  # rotation quaternion and translation, float64
+_PARAMETER_COUNTS = tuple(PARAMETERS.values())
 
-_MOST_TEXT = 1 << 30
-"""Bytes of a model's file in text; one line is held at a time."""
+_MAX_TEXT_BYTES = 1 << 30
+"""Maximum bytes of a model's text file; one line is in memory at a time."""
 
-_PART = 1 << 20
-"""Bytes of a binary file that are held at a time."""
+_WINDOW_BYTES = 1 << 20
+"""Bytes of a binary file that are in memory at a time."""
 
-_TEXTS = ("cameras.txt", "images.txt", "points3D.txt", "rigs.txt", "frames.txt")
+_TEXT_FILES = ("cameras.txt", "images.txt", "points3D.txt", "rigs.txt", "frames.txt")
 
 
 States = dict[str, tuple[int, int]]
 
 
-def check_whole(folder: Path) -> States:
-    """The states that the files of the model in `folder` had before it was looked at, for `check_unchanged`.
+def check_complete(folder: Path) -> States:
+    """States of the files of the model in `folder` before the check, for `check_unchanged`.
 
-    Raises DatasetError, naming the file, where one cannot be read whole: a binary one that ends too early, a
-    text with zeros in it or of more than _MOST_TEXT bytes, a device.
+    Raises DatasetError, naming the file, where a file cannot be read whole: a truncated binary file, a text
+    file with zeros in it or of more than _MAX_TEXT_BYTES bytes, a device.
     """
     states = _states(folder)
-    for name in _TEXTS:
+    for name in _TEXT_FILES:
         _check_text(folder / name)
     for name, skip_record in _RECORDS.items():
         file = folder / name
@@ -66,9 +66,9 @@ def check_whole(folder: Path) -> States:
 
 
 def check_unchanged(folder: Path, states: States) -> None:
-    """Raises DatasetError where a file of the model is not what `check_whole` has looked at.
+    """Raise DatasetError where a file of the model has changed since `check_complete` returned `states`.
 
-    What was read meanwhile is then of both.
+    The data read in between is then a mixture of both versions.
     """
     now = _states(folder)
     for name in sorted({*now, *states}):
@@ -77,15 +77,15 @@ def check_unchanged(folder: Path, states: States) -> None:
 
 
 def is_binary(folder: Path) -> bool:
-    """Whether the model in `folder` is read from its binary files: where they are there."""
+    """Whether the model in `folder` is read from its binary files, which are preferred to text."""
     files = [folder / f"{name}{ending}" for ending in (".bin", ".txt") for name in ("cameras", "images")]
     binary, text = (all(file.is_file() for file in files[at : at + 2]) for at in (0, 2))
     return binary or not (text or files[2].is_file())
 
 
 @contextlib.contextmanager
-def with_points_file(folder: Path) -> Iterator[Path]:
-    """The folder of a binary model; where it has no points, another one with the same files and none."""
+def add_points_file(folder: Path) -> Iterator[Path]:
+    """Folder of a binary model; a temporary copy with an empty points file where the model has none."""
     if (folder / "points3D.bin").is_file() or not (folder / "images.bin").is_file():
         yield folder
         return
@@ -98,16 +98,16 @@ def with_points_file(folder: Path) -> Iterator[Path]:
 
 
 def _states(folder: Path) -> States:
-    """When each of the model's files was written, ns, and its bytes; of those that are there."""
-    found = {name: file_state(folder / name) for name in (*_TEXTS, *_RECORDS)}
+    """(time of writing in ns, bytes) of each of the model's files that exists."""
+    found = {name: file_state(folder / name) for name in (*_TEXT_FILES, *_RECORDS)}
     return {name: state for name, state in found.items() if state is not None}
 
 
 def _check_text(file: Path) -> None:
     try:
-        check_regular(file, _MOST_TEXT)
+        check_regular(file, _MAX_TEXT_BYTES)
         with open_regular(file) as stream:
-            if 0 in stream.read(1 << 12):  # what a copy that ended left of a text
+            if 0 in stream.read(1 << 12):  # the rest of an interrupted copy
                 raise DatasetError(f"{file}: it is no text; copy or export it again")
     except FileNotFoundError:
         return
@@ -124,35 +124,37 @@ class _UnknownRecordError(Exception):
 
 
 class _Window:
-    """The bytes of an open file by their places, of which a part is held."""
+    """Random access to the bytes of an open file, of which one window is in memory."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
-        self._begin, self._held = 0, b""
+        self._start, self._bytes = 0, b""
 
     def unpack(self, form: str, offset: int) -> Any:
-        """What stands at a byte. Raises struct.error where the file ends before."""
-        at = self._at(offset, struct.calcsize(form))
-        return struct.unpack_from(form, self._held, at)
+        """Values of the format `form` at a byte. Raises struct.error where the file ends before."""
+        at = self._seek(offset, struct.calcsize(form))
+        return struct.unpack_from(form, self._bytes, at)
 
     def find(self, byte: bytes, offset: int) -> int:
-        """The place of a byte from `offset` on, -1 where there is none."""
+        """Offset of the first `byte` from `offset` on, -1 where there is none."""
         while True:
-            at = self._at(offset, 1)
-            found = self._held.find(byte, at)
+            at = self._seek(offset, 1)
+            found = self._bytes.find(byte, at)
             if found >= 0:
-                return self._begin + found
-            if not self._held:
+                return self._start + found
+            if not self._bytes:
                 return -1
-            offset = self._begin + len(self._held)
+            offset = self._start + len(self._bytes)
 
-    def _at(self, offset: int, count: int) -> int:
-        """Where `count` bytes of the file, or those up to its end, begin in the part that is held."""
-        if not self._begin <= offset <= self._begin + len(self._held) - count:
-            self._begin = offset
+    def _seek(self, offset: int, count: int) -> int:
+        """Index in the window of the byte `offset`; the window is moved where it lacks `count` bytes from
+        there.
+        """
+        if not self._start <= offset <= self._start + len(self._bytes) - count:
+            self._start = offset
             self._file.seek(offset)
-            self._held = self._file.read(max(_PART, count))
-        return offset - self._begin
+            self._bytes = self._file.read(max(_WINDOW_BYTES, count))
+        return offset - self._start
 
 
 def _walk(data: _Window, size: int, skip_record: Callable[[_Window, int], int]) -> None:
@@ -169,13 +171,13 @@ def _walk(data: _Window, size: int, skip_record: Callable[[_Window, int], int]) 
 
 def _skip_camera(data: _Window, offset: int) -> int:
     (model,) = data.unpack("<i", offset + 4)
-    if not 0 <= model < len(_PARAMETERS):
+    if not 0 <= model < len(_PARAMETER_COUNTS):
         raise _UnknownRecordError
-    return offset + 24 + 8 * _PARAMETERS[model]
+    return offset + 24 + 8 * _PARAMETER_COUNTS[model]
 
 
 def _skip_image(data: _Window, offset: int) -> int:
-    end = data.find(b"\0", offset + 4 + _POSE + 4)
+    end = data.find(b"\0", offset + 4 + _POSE_BYTES + 4)
     if end < 0:
         raise _CutOffError
     (count,) = data.unpack("<Q", end + 1)
@@ -191,13 +193,13 @@ def _skip_rig(data: _Window, offset: int) -> int:
     (sensors,) = data.unpack("<I", offset + 4)
     offset += 8 + (8 if sensors else 0)
     for _ in range(sensors - 1):
-        offset += 9 + (_POSE if data.unpack("<B", offset + 8)[0] else 0)
+        offset += 9 + (_POSE_BYTES if data.unpack("<B", offset + 8)[0] else 0)
     return offset
 
 
 def _skip_frame(data: _Window, offset: int) -> int:
-    (count,) = data.unpack("<I", offset + 8 + _POSE)
-    return int(offset + 12 + _POSE + 16 * count)
+    (count,) = data.unpack("<I", offset + 8 + _POSE_BYTES)
+    return int(offset + 12 + _POSE_BYTES + 16 * count)
 
 
 _RECORDS: dict[str, Callable[[_Window, int], int]] = {

@@ -1,4 +1,4 @@
-"""COLMAP's camera models as cameras: exactly where there is such a lens, else resampled at load.
+"""COLMAP's camera models as cameras: exact where `Camera` has the lens, else resampled at load.
 
 Source: COLMAP, `src/colmap/sensor/models.h`.
 """
@@ -16,7 +16,7 @@ import numpy.typing as npt
 from cagefield.cameras.camera import Camera
 from cagefield.cameras.lenses import Lens
 from cagefield.datasets.notices import warn
-from cagefield.datasets.undistortion import EQUIRECTANGULAR, IDENTITY, SourceLens, colmap_camera
+from cagefield.datasets.undistortion import EQUIRECTANGULAR, IDENTITY, SourceLens, build_colmap_camera
 from cagefield.errors import DatasetError
 
 FloatArray = npt.NDArray[np.float64]
@@ -41,10 +41,12 @@ PARAMETERS: Final[dict[str, int]] = {
     "EUCM": 6,
     EQUIRECTANGULAR: 2,
 }
-"""How many parameters each camera model has; their order is COLMAP's of its numbers, from 0."""
+"""Number of parameters of each camera model, in the order of COLMAP's model numbers from 0."""
 
 MAX_PINHOLE_ANGLE = math.radians(60.0)
-"""Angle to the axis up to which a resampled photo is a pinhole's; a wider one is a fisheye's."""
+"""Maximum angle to the axis, radians, of a resampled photo that becomes a pinhole; wider photos become
+fisheyes.
+"""
 
 FACES: Final[dict[str, tuple[float, ...]]] = {
     "front": IDENTITY,
@@ -54,20 +56,21 @@ FACES: Final[dict[str, tuple[float, ...]]] = {
     "up": (1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0),
     "down": (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0),
 }
-"""The cube's faces that a panorama is shown as: rotations [9] from their axes (OpenCV) to the panorama's."""
+"""Cube faces of a panorama: rotations [9], row by row, from a face's axes (OpenCV) to the panorama's."""
 
-_ONE_FOCAL = ("SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE",
+_ONE_FOCAL_MODELS = ("SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE",
               "SIMPLE_FISHEYE")  # fmt: skip
-_FISHEYES = ("OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "SIMPLE_FISHEYE", "FISHEYE")
-_FLIP = np.diag([1.0, -1.0, -1.0])
-_GRID = 33  # lines of a photo's grid by which its angles and the share that is shown are measured
+_FISHEYE_MODELS = ("OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "SIMPLE_FISHEYE", "FISHEYE")
+_OPENGL_TO_OPENCV_MATRIX = np.diag([1.0, -1.0, -1.0])
+_GRID_LINES = 33  # lines of a photo's grid by which its angles and the share that is shown are measured
 
 
 @dataclass(frozen=True)
 class LensView:
-    """A camera in the identity pose that shows a photo, or a face of it.
+    """Camera in the identity pose that shows a photo, or one face of a panorama.
 
-    `face` is empty where the camera shows the photo as it is. `source` is None where it has the photo's lens.
+    `face` is empty where the camera shows the photo itself. `source` is None where the camera has the photo's
+    lens.
     """
 
     camera: Camera
@@ -82,21 +85,23 @@ class LensView:
         return self.camera.width, self.camera.height
 
     def resized(self, width: int, height: int) -> LensView:
-        """The view of a photo of `width` x `height` pixels."""
+        """View of a photo of `width` x `height` pixels."""
         if self.face:
             return next(view for view in _faces(width, height) if view.face == self.face)
         return replace(self, camera=self.camera.resized(width, height))
 
     def pose(self, c2w: FloatArray) -> FloatArray:
-        """The camera's pose [4,4] where the photo's is `c2w`."""
+        """Pose [4,4] of the camera where the photo's pose is `c2w`."""
         if self.source is None or self.source.rotation == IDENTITY:
             return c2w
-        turn = np.eye(4)
-        turn[:3, :3] = _FLIP @ np.array(self.source.rotation).reshape(3, 3) @ _FLIP
-        return np.asarray(c2w @ turn)
+        rotation = np.eye(4)
+        rotation[:3, :3] = (
+            _OPENGL_TO_OPENCV_MATRIX @ np.array(self.source.rotation).reshape(3, 3) @ _OPENGL_TO_OPENCV_MATRIX
+        )
+        return np.asarray(c2w @ rotation)
 
     def name(self, photo: str) -> str:
-        """The view's name: the photo's, with the face before the extension."""
+        """Name of the view: the photo's name, with the face before the extension."""
         if not self.face:
             return photo
         stem, dot, extension = photo.rpartition(".")
@@ -104,7 +109,7 @@ class LensView:
 
 
 def lens_views(model: str, params: tuple[float, ...], width: int, height: int) -> tuple[LensView, ...]:
-    """The views that show a photo of `width` x `height` pixels of a COLMAP camera model: one, or six faces.
+    """Views of a photo of `width` x `height` pixels of a COLMAP camera model: one, or six faces.
 
     Raises DatasetError for a model that COLMAP does not have and for too many or too few parameters,
     CameraError for values that no camera has.
@@ -120,7 +125,7 @@ def lens_views(model: str, params: tuple[float, ...], width: int, height: int) -
         raise DatasetError(
             f"camera model {model} has {PARAMETERS[model]} parameters, got {len(params)}; export it again"
         )
-    exact = _exact(model, params)
+    exact = _exact_lens(model, params)
     if exact is not None:
         fx, fy, cx, cy, lens, distortion = exact
         return (LensView(Camera(np.eye(4), width, height, fx, fy, cx, cy, lens, distortion)),)
@@ -129,25 +134,29 @@ def lens_views(model: str, params: tuple[float, ...], width: int, height: int) -
 
 
 def report_resampled(where: str, views: Sequence[LensView]) -> None:
-    """Warns once for each camera model that photos are resampled, of `views` one for each view of a photo."""
+    """Warn once for each camera model whose photos are resampled; `views` has an entry for each view of a
+    photo.
+    """
     for model in dict.fromkeys(view.source.model for view in views if view.source is not None):
-        some = [view for view in views if view.source is not None and view.source.model == model]
-        if some[0].face:
+        model_views = [view for view in views if view.source is not None and view.source.model == model]
+        if model_views[0].face:
             warn(
-                f"{where}: {len(some) // len(FACES)} panoramas are shown as {len(FACES)} pictures each, "
-                f"{', '.join(FACES)}, of {some[0].camera.width}x{some[0].camera.height} pixels"
+                f"{where}: {len(model_views) // len(FACES)} panoramas are shown as {len(FACES)} "
+                f"pictures each, "
+                f"{', '.join(FACES)}, of {model_views[0].camera.width}x{model_views[0].camera.height} pixels"
             )
             continue
-        share = min(shown_share(view) for view in dict.fromkeys(some))
-        kind = "fisheye" if some[0].camera.model == "opencv_fisheye" else "pinhole"
+        share = min(shown_share(view) for view in dict.fromkeys(model_views))
+        kind = "fisheye" if model_views[0].camera.model == "opencv_fisheye" else "pinhole"
         warn(
-            f"{where}: {len(some)} photos of camera model {model} are undistorted at load, to a {kind}; "
+            f"{where}: {len(model_views)} photos of camera model {model} are undistorted at load, to a "
+            f"{kind}; "
             f"{share:.0%} of it is kept"
         )
 
 
 def shown_share(view: LensView) -> float:
-    """The share of the photo's area that its view shows, of those directions that the photo has."""
+    """Share of the photo's area that its view shows, among the directions that the photo has."""
     source = view.source
     if source is None or view.face:
         return 1.0
@@ -159,18 +168,20 @@ def shown_share(view: LensView) -> float:
     return float(inside.mean()) if len(inside) else 0.0
 
 
-def _exact(
+def _exact_lens(
     model: str, params: tuple[float, ...]
 ) -> tuple[float, float, float, float, Lens, tuple[float, ...]] | None:
-    """(fx, fy, cx, cy, lens, distortion) where a lens is the camera model's; None where none is."""
-    p = (params[0], *params) if model in _ONE_FOCAL else params
+    """(fx, fy, cx, cy, lens, distortion) of the lens that equals the camera model; None where there is
+    none.
+    """
+    p = (params[0], *params) if model in _ONE_FOCAL_MODELS else params
     fx, fy, cx, cy, *rest = p
     distortion = tuple(rest)
     if model == "THIN_PRISM_FISHEYE" and not any(distortion[i] for i in (2, 3, 6, 7)):
         distortion = (*distortion[:2], *distortion[4:6])
     elif model == "FULL_OPENCV" and not any(distortion[5:]):
         distortion = distortion[:5]
-    elif model in _FISHEYES:
+    elif model in _FISHEYE_MODELS:
         distortion = (*distortion, 0.0, 0.0, 0.0, 0.0)[:4]
     elif model in ("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV"):
         distortion = (*distortion, 0.0, 0.0, 0.0)[:4] if distortion else ()
@@ -181,8 +192,8 @@ def _exact(
 
 
 def _resampled_camera(model: str, params: tuple[float, ...], width: int, height: int) -> Camera:
-    """A pinhole or fisheye of the photo's size, focal length and axis."""
-    lens = colmap_camera(model, params, width, height)
+    """Pinhole or fisheye camera with the photo's size, focal length and principal point."""
+    lens = build_colmap_camera(model, params, width, height)
     intrinsics = (
         float(lens.focal_length_x),
         float(lens.focal_length_y),
@@ -200,9 +211,9 @@ def _resampled_camera(model: str, params: tuple[float, ...], width: int, height:
 
 
 def _grid_directions(source: SourceLens) -> FloatArray:
-    """Unit directions [N,3] of a grid all over the photo, where the lens has them."""
-    lens = colmap_camera(source.model, source.params, source.width, source.height)
-    x, y = np.meshgrid(np.linspace(0, source.width, _GRID), np.linspace(0, source.height, _GRID))
+    """Unit directions [N,3] of a grid over the photo, where the lens has them."""
+    lens = build_colmap_camera(source.model, source.params, source.width, source.height)
+    x, y = np.meshgrid(np.linspace(0, source.width, _GRID_LINES), np.linspace(0, source.height, _GRID_LINES))
     plane = np.asarray(lens.cam_from_img(np.stack([x.ravel(), y.ravel()], axis=1)), np.float64)
     directions = np.concatenate([plane, np.ones((len(plane), 1))], axis=1)
     directions = directions[np.isfinite(directions).all(axis=1)]
@@ -210,7 +221,7 @@ def _grid_directions(source: SourceLens) -> FloatArray:
 
 
 def _faces(width: int, height: int) -> tuple[LensView, ...]:
-    """Square pinholes of 90 degrees, in whose middle a pixel is as wide as the panorama's at its equator."""
+    """Views of a panorama: square pinholes of 90 degrees, with the panorama's pixel size in their middle."""
     focal = max(width / (2 * np.pi), height / np.pi)
     side = max(1, round(2 * focal))
     camera = Camera(np.eye(4), side, side, 0.5 * side, 0.5 * side, 0.5 * side, 0.5 * side)

@@ -1,8 +1,8 @@
-"""COLMAP models in text, as COLMAP and other programs write them.
+"""COLMAP models in text form, as COLMAP and other programs write them.
 
 Names may hold spaces, lines end as on any system, a file may begin with a byte order mark, an image may lack
-its second line (what it saw), the points may be missing. The objects have the attributes of pycolmap's that
-this package reads. Rigs and frames are not read: images have their own poses.
+its second line (its observations), the points may be missing. The objects have the attributes of pycolmap's
+that this package reads. Rigs and frames are not read: images have their own poses.
 
 Source: COLMAP, "Output Format", text.
 """
@@ -22,21 +22,21 @@ from cagefield.datasets.notices import warn
 from cagefield.errors import DatasetError
 from cagefield.files.safe_open import open_regular
 
-MAX_IDENTIFIER = 1 << 62
+MAX_ID = 1 << 62
 
-_LONGEST_SHOWN = 60  # characters of a line in an error
+_MAX_LINE_CHARACTERS = 60  # characters of a line in an error
 
 
 @dataclass(frozen=True)
 class LensModel:
-    """Name of a camera model, as COLMAP writes it."""
+    """Name of a camera model, in COLMAP's spelling."""
 
     name: str
 
 
 @dataclass(frozen=True)
 class TextCamera:
-    """One line of cameras.txt."""
+    """Camera of one line of cameras.txt."""
 
     camera_id: int
     model: LensModel
@@ -47,19 +47,19 @@ class TextCamera:
 
 @dataclass(frozen=True, eq=False)
 class Rigid:
-    """A rotation [3,3] and a translation [3]."""
+    """Rigid motion: rotation [3,3] and translation [3]."""
 
     rotation: npt.NDArray[np.float64]
     translation: npt.NDArray[np.float64]
 
     def matrix(self) -> npt.NDArray[np.float64]:
-        """Both as [3,4]."""
+        """Matrix [3,4] of the rotation and the translation."""
         return np.concatenate([self.rotation, self.translation[:, None]], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class TextImage:
-    """The first line of an image in images.txt."""
+    """Image of one first line in images.txt."""
 
     image_id: int
     camera_id: int
@@ -68,22 +68,22 @@ class TextImage:
 
 
 @dataclass(frozen=True)
-class Sighting:
-    """An image that sees a point."""
+class TrackElement:
+    """Observation of a point in an image."""
 
     image_id: int
 
 
 @dataclass(frozen=True)
 class Track:
-    """The images that see a point."""
+    """Observations of a point."""
 
-    elements: tuple[Sighting, ...]
+    elements: tuple[TrackElement, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class TextPoint:
-    """One line of points3D.txt."""
+    """Point of one line of points3D.txt."""
 
     xyz: npt.NDArray[np.float64]
     color: npt.NDArray[np.uint8]
@@ -93,7 +93,7 @@ class TextPoint:
 
 @dataclass(frozen=True)
 class TextModel:
-    """A model: cameras, images and points by their numbers."""
+    """COLMAP model: cameras, images and points by their numbers."""
 
     cameras: dict[int, TextCamera] = field(default_factory=dict)
     images: dict[int, TextImage] = field(default_factory=dict)
@@ -101,9 +101,9 @@ class TextModel:
 
 
 def read_text_model(folder: Path) -> TextModel:
-    """The model of cameras.txt, images.txt and, where it is there, points3D.txt.
+    """Model of cameras.txt, images.txt and, where it exists, points3D.txt.
 
-    Raises DatasetError, with file and line, for what cannot be read, and for a camera that is not there.
+    Raises DatasetError, with file and line, for unreadable values, and for a camera that is missing.
     """
     model = TextModel()
     _read_cameras(folder / "cameras.txt", model)
@@ -118,27 +118,27 @@ def _read_cameras(file: Path, model: TextModel) -> None:
     for number, tokens in _rows(file):
         where = f"{file}, line {number}"
         if len(tokens) < 5:
-            raise _bad(where, tokens, "must be CAMERA_ID MODEL WIDTH HEIGHT PARAMS")
+            raise _line_error(where, tokens, "must be CAMERA_ID MODEL WIDTH HEIGHT PARAMS")
         camera_id, width, height = (_integer(where, tokens, index) for index in (0, 2, 3))
         params = tuple(_float(where, tokens, index) for index in range(4, len(tokens)))
         model.cameras[camera_id] = TextCamera(camera_id, LensModel(tokens[1]), width, height, params)
 
 
 def _read_images(file: Path, model: TextModel) -> None:
-    said = 0  # images, by the comment at the beginning
-    second = False  # whether the line may be what the image before it has seen
+    declared_count = 0  # images, by the comment at the beginning
+    is_second_line = False  # whether the line may hold the observations of the image before
     for number, line in _lines(file):
         tokens = line.split()
-        if second and (not tokens or _are_sightings(tokens)):
-            second = False
+        if is_second_line and (not tokens or _is_observation_line(tokens)):
+            is_second_line = False
             continue
         if not tokens or tokens[0].startswith("#"):
             if counted := re.search(r"Number of images: (\d+)", line):
-                said = int(counted[1])
+                declared_count = int(counted[1])
             continue
         where = f"{file}, line {number}"
         if len(tokens) < 10:
-            raise _bad(where, tokens, "must be IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME")
+            raise _line_error(where, tokens, "must be IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME")
         image_id, camera_id = _integer(where, tokens, 0), _integer(where, tokens, 8)
         name = line.split(maxsplit=9)[9].strip()
         if camera_id not in model.cameras:
@@ -148,14 +148,15 @@ def _read_images(file: Path, model: TextModel) -> None:
         values = np.array([_float(where, tokens, index) for index in range(1, 8)])
         rigid = Rigid(_rotation(values[:4]), values[4:])
         model.images[image_id] = TextImage(image_id, camera_id, name, rigid)
-        second = True
-    if len(model.images) < said:
+        is_second_line = True
+    if len(model.images) < declared_count:
         warn(
-            f"{file}: it says {said} images and has {len(model.images)}; where it is cut off, export it again"
+            f"{file}: it says {declared_count} images and has {len(model.images)}; where it is cut off, "
+            f"export it again"
         )
 
 
-def _are_sightings(tokens: list[str]) -> bool:
+def _is_observation_line(tokens: list[str]) -> bool:
     """Whether a line holds triples of X, Y and POINT3D_ID."""
     if len(tokens) % 3:
         return False
@@ -169,18 +170,18 @@ def _are_sightings(tokens: list[str]) -> bool:
 
 def _read_point(where: str, tokens: list[str], model: TextModel) -> None:
     if len(tokens) < 7:
-        raise _bad(where, tokens, "must be POINT3D_ID X Y Z R G B ERROR TRACK")
+        raise _line_error(where, tokens, "must be POINT3D_ID X Y Z R G B ERROR TRACK")
     point_id = _integer(where, tokens, 0)
     xyz = np.array([_float(where, tokens, index) for index in (1, 2, 3)])
     color = np.array([_float(where, tokens, index) for index in (4, 5, 6)])
     error = _float(where, tokens, 7) if len(tokens) > 7 else -1.0
-    seen = tuple(Sighting(_integer(where, tokens, index)) for index in range(8, len(tokens), 2))
+    elements = tuple(TrackElement(_integer(where, tokens, index)) for index in range(8, len(tokens), 2))
     color = np.clip(np.where(np.isfinite(color), color, 0.0), 0, 255).astype(np.uint8)
-    model.points3D[point_id] = TextPoint(xyz, color, error, Track(seen))
+    model.points3D[point_id] = TextPoint(xyz, color, error, Track(elements))
 
 
 def _rotation(quaternion: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """The rotation [3,3] of (w, x, y, z) of any length; NaN of one without direction."""
+    """Rotation [3,3] of a quaternion (w, x, y, z) of any length; NaN for length 0."""
     with np.errstate(all="ignore"):
         w, x, y, z = quaternion / np.linalg.norm(quaternion)
     return np.array(
@@ -193,7 +194,7 @@ def _rotation(quaternion: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 
 def _lines(file: Path) -> Iterator[tuple[int, str]]:
-    """Lines with their numbers, without a byte order mark and what ends them."""
+    """(number, text) of each line, without a byte order mark and line ends."""
     try:
         with open_regular(file) as stream:
             for number, content in enumerate(stream, start=1):
@@ -208,7 +209,7 @@ def _lines(file: Path) -> Iterator[tuple[int, str]]:
 
 
 def _rows(file: Path) -> Iterator[tuple[int, list[str]]]:
-    """Tokens of the lines that hold something, with their numbers."""
+    """(number, tokens) of each line that is neither empty nor a comment."""
     for number, line in _lines(file):
         tokens = line.split()
         if tokens and not tokens[0].startswith("#"):
@@ -220,8 +221,8 @@ def _integer(where: str, tokens: list[str], index: int) -> int:
         value = int(tokens[index])
     except ValueError:
         value = -1
-    if not 0 <= value <= MAX_IDENTIFIER:
-        raise _bad(where, tokens, f"must have a whole number at place {index + 1}")
+    if not 0 <= value <= MAX_ID:
+        raise _line_error(where, tokens, f"must have a whole number at place {index + 1}")
     return value
 
 
@@ -229,10 +230,10 @@ def _float(where: str, tokens: list[str], index: int) -> float:
     try:
         return float(tokens[index])
     except ValueError:
-        raise _bad(where, tokens, f"must have a number at place {index + 1}") from None
+        raise _line_error(where, tokens, f"must have a number at place {index + 1}") from None
 
 
-def _bad(where: str, tokens: list[str], wanted: str) -> Any:
+def _line_error(where: str, tokens: list[str], wanted: str) -> Any:
     line = " ".join(tokens)
-    shown = line if len(line) <= _LONGEST_SHOWN else line[:_LONGEST_SHOWN] + "..."
+    shown = line if len(line) <= _MAX_LINE_CHARACTERS else line[:_MAX_LINE_CHARACTERS] + "..."
     return DatasetError(f"{where}: {wanted}, got {shown!r}; export the model again")

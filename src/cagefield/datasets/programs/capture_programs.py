@@ -1,4 +1,4 @@
-"""Capture programs' files and folders: by whom they are, and what reads them."""
+"""Detection of the capture program that wrote a file or folder, and its reader."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from cagefield.datasets.programs.reality_capture import (
     load_reality_capture,
     load_xmp,
 )
-from cagefield.datasets.programs.record3d import METADATA, find_record3d, is_record3d, load_record3d
+from cagefield.datasets.programs.record3d import METADATA_FILE, find_record3d, is_record3d, load_record3d
 from cagefield.datasets.views import Dataset
 from cagefield.errors import DatasetError
 
 Reader = Callable[[Path, int | None, int], Dataset]
-"""Path, factor to shrink by and holdout, as of `load_dataset`."""
+"""Function of a path, a factor to shrink by and a holdout, as for `load_dataset`."""
 
 LAYOUTS = (
     "keyframes (Polycam), metadata.json (Record3D), cameras.xml (Metashape), a CSV file or XMP files of "
@@ -28,8 +28,8 @@ LAYOUTS = (
 LAYOUTS += "cameras (RealityCapture), cameras.sfm (Meshroom)"
 
 
-def program_of_folder(folder: Path) -> tuple[Reader, Path] | None:
-    """Reader of a capture program's folder, and the file or folder that it reads; None for other folders."""
+def find_folder_program(folder: Path) -> tuple[Reader, Path] | None:
+    """(reader, file or folder that it takes) of a capture program's folder; None for other folders."""
     for find, load in (
         (find_polycam, load_polycam),
         (find_record3d, load_record3d),
@@ -44,8 +44,8 @@ def program_of_folder(folder: Path) -> tuple[Reader, Path] | None:
     return None
 
 
-def program_of_file(file: Path) -> tuple[Reader, Path] | None:
-    """Reader of a capture program's file, and the file; None for other files."""
+def find_file_program(file: Path) -> tuple[Reader, Path] | None:
+    """(reader, file or folder that it takes) of a capture program's file; None for other files."""
     suffix = file.suffix.lower()
     if suffix == ".sfm":
         return load_meshroom, file
@@ -61,7 +61,7 @@ def program_of_file(file: Path) -> tuple[Reader, Path] | None:
 
 
 def _program_of_json(file: Path) -> tuple[Reader, Path] | None:
-    if file.name == METADATA:
+    if file.name == METADATA_FILE:
         return load_record3d, file
     if file.name.lower().startswith("sfm"):
         return load_meshroom, file

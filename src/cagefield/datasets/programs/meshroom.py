@@ -23,17 +23,17 @@ import numpy as np
 import numpy.typing as npt
 
 from cagefield.datasets.notices import warn
-from cagefield.datasets.programs.number_parsing import as_number, as_numbers, as_size
+from cagefield.datasets.programs.number_parsing import parse_number, parse_numbers, parse_pixel_count
 from cagefield.datasets.programs.program_dataset import (
-    OPENCV_AXES,
+    OPENCV_AXIS_SIGNS,
     Frame,
     Lenses,
     ProgramCapture,
-    brown_lens,
-    colmap_lens,
-    program_dataset,
+    build_brown_lens,
+    build_colmap_lens,
+    build_program_dataset,
 )
-from cagefield.datasets.programs.program_json import objects_of, read_object
+from cagefield.datasets.programs.program_json import read_object, read_objects
 from cagefield.datasets.views import Dataset, SparsePoints
 from cagefield.errors import DatasetError
 
@@ -41,38 +41,38 @@ FloatArray = npt.NDArray[np.float64]
 
 SCENE_FILES = ("cameras.sfm", "sfm.json", "sfmData.json", "sfm.sfm")
 
-MAX_BYTES = 256 << 20
-"""Bytes of a scene with its structure that is read."""
+MAX_SCENE_BYTES = 256 << 20
+"""Maximum bytes of a scene file, its structure included."""
 
-_RADIAL = {"pinhole": 0, "none": 0, "radial1": 1, "radialk1": 1, "radial3": 3, "radialk3": 3}
+_RADIAL_COUNTS = {"pinhole": 0, "none": 0, "radial1": 1, "radialk1": 1, "radial3": 3, "radialk3": 3}
 
 
 def find_meshroom(folder: Path) -> Path | None:
-    """The scene's file in a folder: one of SCENE_FILES, else the first .sfm; None where it has none."""
-    named = [folder / name for name in SCENE_FILES]
+    """Scene file in a folder: one of SCENE_FILES, else the first .sfm; None where there is none."""
+    standard_files = [folder / name for name in SCENE_FILES]
     others = sorted(file for file in folder.glob("*.sfm") if not file.name.startswith("."))
-    return next((file for file in (*named, *others) if file.is_file()), None)
+    return next((file for file in (*standard_files, *others) if file.is_file()), None)
 
 
 def is_meshroom(values: dict[str, Any]) -> bool:
-    """Whether a JSON file's values are a scene of Meshroom's."""
+    """Whether a JSON file's values are a Meshroom scene."""
     return "views" in values and "intrinsics" in values
 
 
 def load_meshroom(file: Path, downscale: int | None, holdout: int) -> Dataset:
-    """The unbounded data set of a scene's file, whose photos lie where it says, beside it or below.
+    """Unbounded data set of a scene file, whose photos lie at their stored paths, beside the file or below.
 
-    Raises DatasetError where no view has a pose, or what it says makes no sense.
+    Raises DatasetError where no view has a pose, or values are invalid.
     """
-    values = read_object(file, MAX_BYTES)
+    values = read_object(file, MAX_SCENE_BYTES)
     where = str(file)
     version = _version(where, values)
-    poses = {_text(pose.get("poseId")): pose for pose in objects_of(where, values, "poses")}
-    intrinsics = {_text(one.get("intrinsicId")): one for one in objects_of(where, values, "intrinsics")}
+    poses = {_text(pose.get("poseId")): pose for pose in read_objects(where, values, "poses")}
+    intrinsics = {_text(one.get("intrinsicId")): one for one in read_objects(where, values, "intrinsics")}
     lenses: dict[str, Lenses] = {}
     capture = ProgramCapture(file, file.parent, file.parent, [])
     names: dict[str, str] = {}
-    for number, view in enumerate(objects_of(where, values, "views")):
+    for number, view in enumerate(read_objects(where, values, "views")):
         name = view.get("path")
         if not isinstance(name, str) or not name:
             raise DatasetError(f"{file}: views[{number}]: key 'path' must name the photo, got {name!r:.80}")
@@ -92,19 +92,19 @@ def load_meshroom(file: Path, downscale: int | None, holdout: int) -> Dataset:
             capture.frames.append(Frame(name, pose, lenses[intrinsic_id]))
             names[_text(view.get("viewId"))] = name
     capture.points = _points(where, values, names)
-    return program_dataset(capture, downscale, holdout)
+    return build_program_dataset(capture, downscale, holdout)
 
 
 def _text(value: Any) -> str:
-    """An identifier, a number or text, as text."""
+    """Text of an identifier, which may be a number or text."""
     return value if isinstance(value, str) else f"{value!r:.40}"
 
 
 def _version(where: str, values: dict[str, Any]) -> tuple[int, ...]:
-    """The file's version, (1, 0, 0) where it has none."""
+    """Version of the file, (1, 0, 0) where it has none."""
     if values.get("version") is None:
         return (1, 0, 0)
-    numbers = as_numbers(f"{where}: key 'version'", values["version"], 3)
+    numbers = parse_numbers(f"{where}: key 'version'", values["version"], 3)
     if not np.isfinite(numbers).all():
         raise DatasetError(f"{where}: key 'version' must be finite numbers, got {numbers.tolist()}")
     return tuple(int(number) for number in numbers)
@@ -118,15 +118,18 @@ def _pose(where: str, values: dict[str, Any]) -> FloatArray:
         raise DatasetError(f"{where}: has no pose.transform; export the scene again")
     pose = np.eye(4)
     # The columns of world to camera are the rows of its transpose, camera to world.
-    pose[:3, :3] = as_numbers(f"{where}: rotation", transform.get("rotation"), 9).reshape(3, 3)
-    pose[:3, 3] = as_numbers(f"{where}: center", transform.get("center"), 3)
-    return pose * OPENCV_AXES
+    pose[:3, :3] = parse_numbers(f"{where}: rotation", transform.get("rotation"), 9).reshape(3, 3)
+    pose[:3, 3] = parse_numbers(f"{where}: center", transform.get("center"), 3)
+    return pose * OPENCV_AXIS_SIGNS
 
 
 def _lenses(where: str, values: dict[str, Any], version: tuple[int, ...]) -> Lenses:
-    size = as_size(f"{where}: width", values.get("width")), as_size(f"{where}: height", values.get("height"))
-    focal = _focal(where, values, version, size[0])
-    center = as_numbers(f"{where}: principalPoint", values.get("principalPoint", [0, 0]), 2)
+    size = (
+        parse_pixel_count(f"{where}: width", values.get("width")),
+        parse_pixel_count(f"{where}: height", values.get("height")),
+    )
+    focal = _focal_pixels(where, values, version, size[0])
+    center = parse_numbers(f"{where}: principalPoint", values.get("principalPoint", [0, 0]), 2)
     if version >= (1, 2, 1):
         center += np.array(size) * 0.5
     kind = _text(values.get("type", "pinhole")).lower()
@@ -135,72 +138,77 @@ def _lenses(where: str, values: dict[str, Any], version: tuple[int, ...]) -> Len
     params = values.get("distortionParams") or []
     if not isinstance(params, list) or len(params) > 20:
         raise DatasetError(f"{where}: key 'distortionParams' must be a list of numbers")
-    found = [as_number(f"{where}: distortionParams", one) for one in params]
+    coefficients = [parse_number(f"{where}: distortionParams", one) for one in params]
     if _text(values.get("undistortionType", "none")).lower() != "none" and values.get("undistortionParams"):
         warn(f"{where}: its undistortionParams are not used")
     middle = (float(center[0]), float(center[1]))
-    if not any(found) and kind not in ("fisheye4", "fisheye1", "equidistant", "equidistant_r3"):
-        return brown_lens(where, size, focal, middle)
-    if kind in _RADIAL and len(found) >= _RADIAL[kind]:
-        return brown_lens(where, size, focal, middle, found[: _RADIAL[kind]])
-    if kind == "brown" and len(found) == 5:
-        return brown_lens(where, size, focal, middle, found[:3], found[3:])
-    if kind == "fisheye4" and len(found) in (0, 4):
-        return colmap_lens(where, "OPENCV_FISHEYE", (*focal, *middle, *(found or [0.0] * 4)), size)
-    if kind == "fisheye1" and len(found) == 1:
-        return colmap_lens(where, "FOV", (*focal, *middle, *found), size)
+    if not any(coefficients) and kind not in ("fisheye4", "fisheye1", "equidistant", "equidistant_r3"):
+        return build_brown_lens(where, size, focal, middle)
+    if kind in _RADIAL_COUNTS and len(coefficients) >= _RADIAL_COUNTS[kind]:
+        return build_brown_lens(where, size, focal, middle, coefficients[: _RADIAL_COUNTS[kind]])
+    if kind == "brown" and len(coefficients) == 5:
+        return build_brown_lens(where, size, focal, middle, coefficients[:3], coefficients[3:])
+    if kind == "fisheye4" and len(coefficients) in (0, 4):
+        return build_colmap_lens(
+            where, "OPENCV_FISHEYE", (*focal, *middle, *(coefficients or [0.0] * 4)), size
+        )
+    if kind == "fisheye1" and len(coefficients) == 1:
+        return build_colmap_lens(where, "FOV", (*focal, *middle, *coefficients), size)
     raise DatasetError(
-        f"{where}: camera type {kind!r:.40} with {len(found)} distortionParams cannot be read; export the "
+        f"{where}: camera type {kind!r:.40} with {len(coefficients)} distortionParams cannot be read; "
+        f"export the "
         "undistorted photos (node ExportImages or PrepareDenseScene) with their cameras"
     )
 
 
-def _focal(where: str, values: dict[str, Any], version: tuple[int, ...], width: int) -> tuple[float, float]:
-    """Focal lengths in pixels."""
+def _focal_pixels(
+    where: str, values: dict[str, Any], version: tuple[int, ...], width: int
+) -> tuple[float, float]:
+    """Focal lengths (fx, fy) in pixels."""
     pixels = values.get("pxFocalLength")
     if isinstance(pixels, list):
-        fx, fy = as_numbers(f"{where}: pxFocalLength", pixels, 2).tolist()
+        fx, fy = parse_numbers(f"{where}: pxFocalLength", pixels, 2).tolist()
         return fx, fy
     if pixels is not None:
-        f = as_number(f"{where}: pxFocalLength", pixels)
+        f = parse_number(f"{where}: pxFocalLength", pixels)
         return f, f
     if "focalLength" not in values:
         raise DatasetError(f"{where}: has no focalLength; export the scene again")
-    sensor = as_number(f"{where}: sensorWidth", values.get("sensorWidth", 36.0))
-    ratio = as_number(f"{where}: pixelRatio", values.get("pixelRatio", 1.0))
+    sensor = parse_number(f"{where}: sensorWidth", values.get("sensorWidth", 36.0))
+    ratio = parse_number(f"{where}: pixelRatio", values.get("pixelRatio", 1.0))
     if sensor <= 0 or ratio <= 0:
         raise DatasetError(f"{where}: sensorWidth and pixelRatio must be positive, got {sensor:g}, {ratio:g}")
-    fx = as_number(f"{where}: focalLength", values["focalLength"]) * width / sensor
+    fx = parse_number(f"{where}: focalLength", values["focalLength"]) * width / sensor
     return fx, fx / ratio if version < (1, 2, 5) else fx * ratio
 
 
 def _points(where: str, values: dict[str, Any], names: dict[str, str]) -> SparsePoints | None:
-    """The points of `structure` with finite positions; None where there are none."""
-    landmarks = objects_of(where, values, "structure")
+    """Sparse points of `structure` with finite positions; None where there are none."""
+    landmarks = read_objects(where, values, "structure")
     if not landmarks:
         return None
     positions = np.stack(
-        [as_numbers(f"{where}: structure[{n}].X", p.get("X"), 3) for n, p in enumerate(landmarks)]
+        [parse_numbers(f"{where}: structure[{n}].X", p.get("X"), 3) for n, p in enumerate(landmarks)]
     )
-    colors = [as_numbers(f"{where}: structure[{n}].color", p.get("color", [127] * 3), 3) for n, p in
+    colors = [parse_numbers(f"{where}: structure[{n}].color", p.get("color", [127] * 3), 3) for n, p in
               enumerate(landmarks)]  # fmt: skip
     seen_by = tuple(
         frozenset(
             names[_text(one.get("observationId"))]
-            for one in objects_of(where, point, "observations")
+            for one in read_objects(where, point, "observations")
             if _text(one.get("observationId")) in names
         )
         for point in landmarks
     )
     rgb = np.stack(colors)
     finite = np.isfinite(np.concatenate([positions, rgb], axis=1)).all(axis=1)
-    kept = np.flatnonzero(finite)
-    if left_out := len(landmarks) - len(kept):
+    rows = np.flatnonzero(finite)
+    if left_out := len(landmarks) - len(rows):
         warn(f"{where}: {left_out} of {len(landmarks)} points are left out, they are not finite")
-    if not len(kept):
+    if not len(rows):
         return None
     return SparsePoints(
-        positions[kept],
-        np.clip(rgb[kept], 0, 255).astype(np.uint8),
-        tuple(seen_by[n] for n in kept) if any(seen_by) else (),
+        positions[rows],
+        np.clip(rgb[rows], 0, 255).astype(np.uint8),
+        tuple(seen_by[n] for n in rows) if any(seen_by) else (),
     )

@@ -1,4 +1,4 @@
-"""Numbers in files of other programs: JSON's, or text as some programs write them."""
+"""Parsing of numbers in files of other programs: JSON numbers, or numbers in text."""
 
 from __future__ import annotations
 
@@ -11,23 +11,27 @@ from cagefield.errors import DatasetError
 
 FloatArray = npt.NDArray[np.float64]
 
-_MAX_DIGITS = 400  # characters of a number
+_MAX_NUMBER_CHARACTERS = 400  # characters of a number
 
 
-def as_number(where: str, value: Any) -> float:
-    """A finite number, or text that is one. Raises DatasetError, which begins with `where`."""
+def parse_number(where: str, value: Any) -> float:
+    """Finite number of a JSON value or a text. Raises DatasetError, which begins with `where`."""
     found = _float(value)
     if found is None or not np.isfinite(found):
         raise DatasetError(f"{where} must be a finite number, got {value!r:.40}")
     return found
 
 
-def as_numbers(where: str, values: Any, count: int) -> FloatArray:
-    """`count` numbers of a list, or of text with spaces between them, finite or not.
+def parse_numbers(where: str, values: Any, count: int) -> FloatArray:
+    """Array [count] of the numbers of a list, or of a text with spaces between them, finite or not.
 
     Raises DatasetError, which begins with `where`.
     """
-    parts = values.split() if isinstance(values, str) and len(values) <= count * _MAX_DIGITS else values
+    parts = (
+        values.split()
+        if isinstance(values, str) and len(values) <= count * _MAX_NUMBER_CHARACTERS
+        else values
+    )
     if isinstance(parts, list) and len(parts) == count:
         found = [_float(part) for part in parts]
         if None not in found:
@@ -35,9 +39,9 @@ def as_numbers(where: str, values: Any, count: int) -> FloatArray:
     raise DatasetError(f"{where} must be {count} numbers, got {values!r:.80}")
 
 
-def as_size(where: str, value: Any) -> int:
-    """A whole number of pixels, from 1. Raises DatasetError, which begins with `where`."""
-    found = as_number(where, value)
+def parse_pixel_count(where: str, value: Any) -> int:
+    """Whole number of pixels, at least 1. Raises DatasetError, which begins with `where`."""
+    found = parse_number(where, value)
     if found < 1 or found != int(found):
         raise DatasetError(f"{where} must be a whole number of pixels, got {value!r:.40}")
     return int(found)
@@ -46,7 +50,7 @@ def as_size(where: str, value: Any) -> int:
 def _float(value: Any) -> float | None:
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         return None
-    if isinstance(value, str) and len(value) > _MAX_DIGITS:
+    if isinstance(value, str) and len(value) > _MAX_NUMBER_CHARACTERS:
         return None
     try:
         return float(value)

@@ -10,16 +10,16 @@ from cagefield.errors import DatasetError
 from cagefield.files.safe_open import MOST_TEXT
 
 
-def read_object(path: Path, most: int = MOST_TEXT) -> dict[str, Any]:
-    """The object of a JSON file of at most `most` bytes; numbers may be infinite or no numbers.
+def read_object(path: Path, max_bytes: int = MOST_TEXT) -> dict[str, Any]:
+    """Object of a JSON file of at most `max_bytes`; numbers may be infinite or NaN.
 
-    Raises DatasetError where it is not one.
+    Raises DatasetError where the content is no object.
     """
-    return read_json(path, most, "of a capture program; export it again")
+    return read_json(path, max_bytes, "of a capture program; export it again")
 
 
-def objects_of(where: str, values: dict[str, Any], key: str) -> list[dict[str, Any]]:
-    """The list of objects at a key; empty where there is none. Raises DatasetError for anything else."""
+def read_objects(where: str, values: dict[str, Any], key: str) -> list[dict[str, Any]]:
+    """List of objects at a key; empty where there is none. Raises DatasetError for anything else."""
     found = values.get(key) or []
     if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
         raise DatasetError(f"{where}: key {key!r} must be a list of objects")

@@ -28,14 +28,14 @@ from scipy.spatial.transform import Rotation
 from cagefield.datasets.hidden_files import is_hidden
 from cagefield.datasets.notices import warn
 from cagefield.datasets.photos import EXTENSIONS
-from cagefield.datasets.programs.number_parsing import as_number, as_numbers
+from cagefield.datasets.programs.number_parsing import parse_number, parse_numbers
 from cagefield.datasets.programs.program_dataset import (
-    OPENCV_AXES,
+    OPENCV_AXIS_SIGNS,
     Frame,
     Lenses,
     ProgramCapture,
-    brown_lens,
-    program_dataset,
+    build_brown_lens,
+    build_program_dataset,
 )
 from cagefield.datasets.programs.xml_files import read_xml
 from cagefield.datasets.views import Dataset
@@ -45,16 +45,16 @@ from cagefield.files.safe_open import read_bytes
 FloatArray = npt.NDArray[np.float64]
 Row = Mapping[str, str]
 
-FILM_WIDTH = 36.0
-"""Millimeters of the longer side that 35 mm equivalents refer to."""
+FILM_WIDTH_MM = 36.0
+"""Longer side of the film that 35 mm equivalent focal lengths refer to."""
 
-MAX_DIVISION_ERROR = 0.1
-"""Pixels by which Brown's model may miss the division model of a lens."""
+MAX_DIVISION_ERROR_PIXELS = 0.1
+"""Maximum error of Brown's model fitted to the division model of a lens."""
 
-_XCR = "{http://www.capturingreality.com/ns/xcr/1.1#}"
-_SYNONYMS = {"yaw": "heading", "f_35mm": "f", "px_norm": "px", "py_norm": "py", "z": "alt"}
-_ANGLES = {"name", "x", "y", "alt", "heading", "pitch", "roll", "f"}
-_MATRIX = {
+_XCR_NAMESPACE = "{http://www.capturingreality.com/ns/xcr/1.1#}"
+_COLUMN_SYNONYMS = {"yaw": "heading", "f_35mm": "f", "px_norm": "px", "py_norm": "py", "z": "alt"}
+_ANGLE_COLUMNS = {"name", "x", "y", "alt", "heading", "pitch", "roll", "f"}
+_MATRIX_COLUMNS = {
     "name",
     "tx",
     "ty",
@@ -64,47 +64,51 @@ _MATRIX = {
     "py_pix",
     *(f"r{i}{j}" for i in range(3) for j in range(3)),
 }
-_HEAD = 1 << 12  # bytes in which a CSV file has its columns' names
-_PROBED = 50  # XMP files that are looked at: photos that are not aligned have no pose
+_CSV_HEAD_BYTES = 1 << 12  # bytes in which a CSV file has its columns' names
+_MAX_PROBED_FILES = 50  # XMP files that are looked at: photos that are not aligned have no pose
 
 
 def is_reality_capture(file: Path) -> bool:
     """Whether a CSV file has the columns of cameras."""
     try:
         with file.open("rb") as content:
-            start = content.read(_HEAD).decode("utf-8-sig", errors="replace")
+            start = content.read(_CSV_HEAD_BYTES).decode("utf-8-sig", errors="replace")
     except OSError:
         return False
     return any(_columns(line) is not None for line in start.splitlines()[:3])
 
 
 def find_reality_capture(folder: Path) -> Path | None:
-    """The first CSV file of cameras in a folder; None where it has none."""
+    """First CSV file of cameras in a folder; None where there is none."""
     files = sorted(f for f in folder.glob("*.[cC][sS][vV]") if not is_hidden([f.name]))
     return next((file for file in files if file.is_file() and is_reality_capture(file)), None)
 
 
 def find_xmp(folder: Path) -> Path | None:
-    """The folder, or its folder of photos, in which XMP files with poses lie beside photos; None else."""
-    for place in (folder, folder / "images"):
-        if place.is_dir() and any(_has_pose(file) for file in _xmp_files(place)[:_PROBED]):
-            return place
+    """Folder, or its folder `images`, in which XMP files with poses lie beside photos; None where there is
+    none.
+    """
+    for photo_folder in (folder, folder / "images"):
+        if photo_folder.is_dir() and any(
+            _has_pose(file) for file in _xmp_files(photo_folder)[:_MAX_PROBED_FILES]
+        ):
+            return photo_folder
     return None
 
 
 def _has_pose(file: Path) -> bool:
-    """Whether an XMP file of a usual size has a pose of RealityCapture's."""
+    """Whether an XMP file of a usual size has a RealityCapture pose."""
     try:
-        content = read_bytes(file, _HEAD << 4)
+        content = read_bytes(file, _CSV_HEAD_BYTES << 4)
     except OSError:
         return False
     return b"capturingreality" in content and b"Rotation" in content
 
 
 def load_reality_capture(file: Path, downscale: int | None, holdout: int) -> Dataset:
-    """The unbounded data set of a CSV file of cameras, whose photos lie beside it or below.
+    """Unbounded data set of a CSV file of cameras, whose photos lie beside it or below.
 
-    Raises DatasetError for columns that are not known, and numbers that make no sense.
+    Raises DatasetError for unknown columns and invalid numbers.
     """
     try:
         text = read_bytes(file).decode("utf-8-sig")
@@ -134,15 +138,15 @@ def load_reality_capture(file: Path, downscale: int | None, holdout: int) -> Dat
             )
         values = {name: value.strip() for name, value in zip(names, row, strict=False)}
         frames.append(read(f"{file}: line {number}", values))
-    return program_dataset(
+    return build_program_dataset(
         ProgramCapture(file, file.parent, file.parent, frames, up=(0.0, 0.0, 1.0)), downscale, holdout
     )
 
 
 def load_xmp(folder: Path, downscale: int | None, holdout: int) -> Dataset:
-    """The unbounded data set of a folder of photos with an XMP file beside each.
+    """Unbounded data set of a folder of photos with an XMP file beside each.
 
-    Raises DatasetError where no XMP file has a pose, or what one says makes no sense.
+    Raises DatasetError where no XMP file has a pose, or values are invalid.
     """
     capture = ProgramCapture(folder, folder, folder, [], up=(0.0, 0.0, 1.0))
     for file in _xmp_files(folder):
@@ -150,30 +154,30 @@ def load_xmp(folder: Path, downscale: int | None, holdout: int) -> Dataset:
         if "Rotation" not in values or "Position" not in values:
             capture.left_out.setdefault("have no pose in their XMP files", []).append(file.stem)
             continue
-        rotation = as_numbers(f"{file}: Rotation", values["Rotation"], 9).reshape(3, 3)
-        position = as_numbers(f"{file}: Position", values["Position"], 3)
+        rotation = parse_numbers(f"{file}: Rotation", values["Rotation"], 9).reshape(3, 3)
+        position = parse_numbers(f"{file}: Position", values["Position"], 3)
         capture.frames.append(Frame(file.stem, _pose(rotation, position), _xmp_lenses(file, values)))
-    return program_dataset(capture, downscale, holdout)
+    return build_program_dataset(capture, downscale, holdout)
 
 
 # ---- CSV ----
 
-_MATRIX_KEYS = frozenset(_MATRIX)
+_MATRIX_KEYS = frozenset(_MATRIX_COLUMNS)
 
 
 def _column_names(line: str) -> list[str]:
     names = [name.strip().lstrip("#").split("(")[0].strip().lower() for name in line.split(",")]
-    return [_SYNONYMS.get(name, name) for name in names]
+    return [_COLUMN_SYNONYMS.get(name, name) for name in names]
 
 
 def _columns(line: str) -> frozenset[str] | None:
-    """The names of columns in a line, None where they are not those of cameras."""
+    """Names of columns in a line, None where they are not the columns of cameras."""
     names = frozenset(_column_names(line))
-    return names if names >= _ANGLES or names >= _MATRIX else None
+    return names if names >= _ANGLE_COLUMNS or names >= _MATRIX_COLUMNS else None
 
 
 def _number(where: str, row: Row, key: str) -> float:
-    return as_number(f"{where}: column {key!r}", row.get(key, "0"))
+    return parse_number(f"{where}: column {key!r}", row.get(key, "0"))
 
 
 def _frame_by_angles(where: str, row: Row) -> Frame:
@@ -193,13 +197,13 @@ def _frame_by_matrix(where: str, row: Row) -> Frame:
     radial, tangential = _coefficients(where, row)
 
     def lenses(width: int, height: int) -> Lenses:
-        return brown_lens(where, (width, height), (f, f), (px, py), radial, tangential)
+        return build_brown_lens(where, (width, height), (f, f), (px, py), radial, tangential)
 
     return Frame(row["name"], _pose(rotation, -rotation.T @ translation), lenses)
 
 
 def _coefficients(where: str, row: Row) -> tuple[list[float], tuple[float, float]]:
-    """k1..k4, and OpenCV's p1, p2."""
+    """(k1..k4, OpenCV's p1, p2)."""
     radial = [_number(where, row, key) for key in ("k1", "k2", "k3", "k4")]
     return radial, (_number(where, row, "t2"), _number(where, row, "t1"))
 
@@ -207,13 +211,13 @@ def _coefficients(where: str, row: Row) -> tuple[list[float], tuple[float, float
 def _film_lens(
     where: str, f: float, center: tuple[float, float], radial: list[float], tangential: tuple[float, float]
 ) -> Callable[[int, int], Lenses]:
-    """The lens of a 35 mm equivalent focal length, for photos of any size."""
+    """Lens of a 35 mm equivalent focal length, for photos of any size."""
 
     def lenses(width: int, height: int) -> Lenses:
         scale = float(max(width, height))
-        focal = f * scale / FILM_WIDTH
+        focal = f * scale / FILM_WIDTH_MM
         middle = 0.5 * width + center[0] * scale, 0.5 * height + center[1] * scale
-        return brown_lens(where, (width, height), (focal, focal), middle, radial, tangential)
+        return build_brown_lens(where, (width, height), (focal, focal), middle, radial, tangential)
 
     return lenses
 
@@ -232,15 +236,19 @@ def _xmp_values(file: Path) -> dict[str, str]:
     """Values of an XMP file in the namespace of RealityCapture, as attributes or elements."""
     values: dict[str, str] = {}
     for element in read_xml(file).iter():
-        values |= {k.removeprefix(_XCR): v for k, v in element.attrib.items() if k.startswith(_XCR)}
-        if element.tag.startswith(_XCR) and element.text:
-            values[element.tag.removeprefix(_XCR)] = element.text
+        values |= {
+            k.removeprefix(_XCR_NAMESPACE): v
+            for k, v in element.attrib.items()
+            if k.startswith(_XCR_NAMESPACE)
+        }
+        if element.tag.startswith(_XCR_NAMESPACE) and element.text:
+            values[element.tag.removeprefix(_XCR_NAMESPACE)] = element.text
     return values
 
 
 def _xmp_lenses(file: Path, values: Mapping[str, str]) -> Callable[[int, int], Lenses]:
     def value(key: str, default: str = "0") -> float:
-        return as_number(f"{file}: {key}", values.get(key, default))
+        return parse_number(f"{file}: {key}", values.get(key, default))
 
     if "FocalLength35mm" not in values:
         raise DatasetError(f"{file}: has no FocalLength35mm; export the XMP files with their calibration")
@@ -249,7 +257,7 @@ def _xmp_lenses(file: Path, values: Mapping[str, str]) -> Callable[[int, int], L
         warn(f"{file}: its skew and aspect ratio are not used")
     model = values.get("DistortionModel", "perspective").strip().lower()
     text = values.get("DistortionCoeficients") or values.get("DistortionCoefficients") or "0 0 0 0 0 0"
-    k1, k2, k3, k4, t1, t2 = as_numbers(f"{file}: DistortionCoeficients", text, 6).tolist()
+    k1, k2, k3, k4, t1, t2 = parse_numbers(f"{file}: DistortionCoeficients", text, 6).tolist()
     if model in ("none", "perspective"):
         return _film_lens(str(file), f, center, [], (0.0, 0.0))
     if model.startswith("brown"):
@@ -257,22 +265,23 @@ def _xmp_lenses(file: Path, values: Mapping[str, str]) -> Callable[[int, int], L
     if model != "division":
         raise DatasetError(f"{file}: DistortionModel {model!r:.40} cannot be read; export undistorted photos")
     return lambda width, height: _film_lens(
-        str(file), f, center, _division_as_brown(str(file), k1, f, width, height), (0.0, 0.0)
+        str(file), f, center, _fit_brown_to_division(str(file), k1, f, width, height), (0.0, 0.0)
     )(width, height)
 
 
-def _division_as_brown(where: str, k1: float, f: float, width: int, height: int) -> list[float]:
-    """Brown's radial coefficients [4] next to 1 / (1 + k1 r^2) - 1 all over the photo, by least squares.
+def _fit_brown_to_division(where: str, k1: float, f: float, width: int, height: int) -> list[float]:
+    """Radial coefficients [4] of Brown's model fitted to 1 / (1 + k1 r^2) - 1 over the whole photo, by least
+    squares.
 
-    Raises DatasetError where they miss it by more than MAX_DIVISION_ERROR pixels.
+    Raises DatasetError where the error exceeds MAX_DIVISION_ERROR_PIXELS.
     """
     if not k1:
         return []
-    focal = f * max(width, height) / FILM_WIDTH
+    focal = f * max(width, height) / FILM_WIDTH_MM
     if not focal > 0:
         raise DatasetError(f"{where}: FocalLength35mm must be positive, got {f:g}")
     corner = 0.5 * float(np.hypot(width, height)) / focal
-    radius = _undistorted(k1, corner) * np.sqrt(np.linspace(0.0, 1.0, 400)[1:])
+    radius = _undistort_radius(k1, corner) * np.sqrt(np.linspace(0.0, 1.0, 400)[1:])
     with np.errstate(all="ignore"):
         wanted = 1.0 / (1.0 + k1 * radius**2) - 1.0
     if not np.isfinite(wanted).all() or not radius[-1] > 0:
@@ -280,7 +289,7 @@ def _division_as_brown(where: str, k1: float, f: float, width: int, height: int)
     powers = (radius / radius[-1])[:, None] ** (2, 4, 6, 8)
     found = np.linalg.lstsq(powers * radius[:, None], wanted * radius, rcond=None)[0]
     error = focal * float(np.abs((powers @ found - wanted) * radius).max())
-    if not error <= MAX_DIVISION_ERROR:
+    if not error <= MAX_DIVISION_ERROR_PIXELS:
         raise DatasetError(
             f"{where}: its division model (k1 = {k1:g}) cannot be read, Brown's misses it by "
             f"{error:.2g} pixels; align with a Brown model, or export undistorted photos"
@@ -288,8 +297,10 @@ def _division_as_brown(where: str, k1: float, f: float, width: int, height: int)
     return [float(k / radius[-1] ** n) for k, n in zip(found, (2, 4, 6, 8), strict=True)]
 
 
-def _undistorted(k1: float, distorted: float) -> float:
-    """The radius whose division model is `distorted`; the largest that has one, where there is none."""
+def _undistort_radius(k1: float, distorted: float) -> float:
+    """Radius that the division model takes to `distorted`; the largest possible radius where there is
+    none.
+    """
     root = 1.0 - 4.0 * k1 * distorted**2
     return 2.0 * distorted / (1.0 + float(np.sqrt(max(root, 0.0))))
 
@@ -299,4 +310,4 @@ def _pose(rotation: FloatArray, position: FloatArray) -> FloatArray:
     pose = np.eye(4)
     pose[:3, :3] = rotation.T
     pose[:3, 3] = position
-    return pose * OPENCV_AXES
+    return pose * OPENCV_AXIS_SIGNS

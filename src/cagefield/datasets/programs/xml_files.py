@@ -10,7 +10,7 @@ from cagefield.errors import DatasetError
 from cagefield.files.safe_open import read_bytes
 
 MAX_TAGS = 2_000_000
-"""Signs `<` in a file: a tree takes a hundred bytes and more for each element."""
+"""Maximum number of characters `<` in a file: a tree takes a hundred bytes and more for each element."""
 
 _BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -20,7 +20,7 @@ _BYTE_ORDER_MARKS = (
 
 
 def read_xml(path: Path) -> ElementTree.Element:
-    """The root element of an XML file.
+    """Root element of an XML file.
 
     Raises DatasetError for a file that is no XML, has a document type (entities may grow without bounds), or
     is too large.
@@ -44,6 +44,6 @@ def read_xml(path: Path) -> ElementTree.Element:
 
 
 def child_text(element: ElementTree.Element | None, tag: str) -> str | None:
-    """The text of an element's child; None where there is none, or no text in it."""
+    """Text of an element's child; None where there is none, or no text in it."""
     child = None if element is None else element.find(tag)
     return None if child is None or not (child.text or "").strip() else child.text

@@ -1,8 +1,8 @@
-"""COLMAP's work in processes of its own: it ends its process where it cannot write its database.
+"""Child processes for COLMAP, which aborts its process where it cannot write its database.
 
-A process is told what to do in one line of JSON on its input, which stays open: where that closes, the one
-that started it has ended, and it ends too. It says `done N` for what is done, and `failed REASON`. What else
-it says is COLMAP's.
+A child reads its task as one line of JSON from its standard input, which stays open: its end means that the
+parent has ended, and the child ends too. The child prints `done N` for the progress, and `failed REASON`; all
+other lines are COLMAP's.
 """
 
 from __future__ import annotations
@@ -19,22 +19,23 @@ from typing import Any
 
 from cagefield.errors import DatasetError
 
-_LAST_WORDS = 60
-"""Lines of a process that has ended that are looked at."""
+_MAX_KEPT_LINES = 60
+"""Number of last output lines of a child that are kept for its error message."""
 
-_SAID = re.compile(r"what\(\): +(\S.*)")
-"""What the C++ library says of an error that nobody handles."""
+_EXCEPTION_TEXT = re.compile(r"what\(\): +(\S.*)")
+"""Pattern of the C++ library's message about an uncaught exception."""
 
 
 class StoppedError(DatasetError):
-    """COLMAP, or the system beneath it, went no further: the photos are not to blame."""
+    """Failure of COLMAP, or of the system beneath it, for which the photos are not to blame."""
 
 
-def run(what: str, tasks: Sequence[Mapping[str, Any]], on_done: Callable[[int], None]) -> None:
-    """Does tasks of `colmap_tasks`, each in a process of its own, side by side.
+def run(stage: str, tasks: Sequence[Mapping[str, Any]], on_done: Callable[[int], None]) -> None:
+    """Run tasks of `colmap_tasks` in parallel, each in a process of its own.
 
-    `on_done` is called several times a second with the sum of what they have done. Raises StoppedError, that
-    says `what` stopped and why, where one fails; the others are then ended, as they are by any other error.
+    `on_done` is called several times a second with the sum of their progress. Raises StoppedError with the
+    reason where one fails, `stage` being the subject of the message; the other processes are then killed, as
+    on any error.
     """
     running: list[_Process] = []
     try:
@@ -47,7 +48,7 @@ def run(what: str, tasks: Sequence[Mapping[str, Any]], on_done: Callable[[int], 
         for process in running:
             if process.ended.is_set() and process.popen.returncode:
                 raise StoppedError(
-                    f"{what} stopped with status {process.popen.returncode}: {process.reason()}"
+                    f"{stage} stopped with status {process.popen.returncode}: {process.reason()}"
                 )
         on_done(sum(process.done for process in running))
     finally:
@@ -56,12 +57,12 @@ def run(what: str, tasks: Sequence[Mapping[str, Any]], on_done: Callable[[int], 
 
 
 class _Process:
-    """A process that does a task, and what it said."""
+    """Child process of one task, with its progress and last output."""
 
     def __init__(self, task: Mapping[str, Any]) -> None:
         self.done = 0
         self.ended = threading.Event()
-        self._words: collections.deque[str] = collections.deque(maxlen=_LAST_WORDS)
+        self._last_lines: collections.deque[str] = collections.deque(maxlen=_MAX_KEPT_LINES)
         self._failed = ""
         self._task = json.dumps(task)
         self.popen = subprocess.Popen(
@@ -73,10 +74,10 @@ class _Process:
             encoding="utf-8",
             errors="replace",
         )
-        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread = threading.Thread(target=self._read_output, daemon=True)
         self._thread.start()
 
-    def _listen(self) -> None:
+    def _read_output(self) -> None:
         assert self.popen.stdin is not None and self.popen.stdout is not None
         with contextlib.suppress(OSError, ValueError):  # it has ended
             self.popen.stdin.write(self._task + "\n")
@@ -89,17 +90,21 @@ class _Process:
                 elif kind == "failed":
                     self._failed = rest
                 elif line.strip():
-                    self._words.append(line.strip())
+                    self._last_lines.append(line.strip())
         self.popen.wait()
         self.ended.set()
 
     def reason(self) -> str:
-        """Why it ended: what it said itself, else the C++ library, else its last line."""
-        said = [found[1] for line in self._words if (found := _SAID.match(line))]
-        return self._failed or next(iter(said), "") or (self._words[-1] if self._words else "no words")
+        """Reason of the child's end: its own message, else the C++ library's, else its last line."""
+        messages = [found[1] for line in self._last_lines if (found := _EXCEPTION_TEXT.match(line))]
+        return (
+            self._failed
+            or next(iter(messages), "")
+            or (self._last_lines[-1] if self._last_lines else "no words")
+        )
 
     def end(self) -> None:
-        """Ends it, and waits for that."""
+        """Kill the child and wait for its end."""
         self.popen.kill()
         self._thread.join()
         for pipe in (self.popen.stdin, self.popen.stdout):

@@ -1,4 +1,4 @@
-"""What a process of `colmap_process` does: `python -m cagefield.datasets.sfm.colmap_tasks`."""
+"""Entry point of the child processes of `colmap_process`: `python -m cagefield.datasets.sfm.colmap_tasks`."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from cagefield.datasets.sfm import features, matching
 from cagefield.errors import CagefieldError, line_of
 
 _TASKS: dict[str, Callable[..., None]] = {
-    "extract": features.extract_here,
-    "match": matching.match_here,
+    "extract": features.extract_in_process,
+    "match": matching.match_in_process,
 }
 
 
 def main() -> int:
-    """Does the task on its input; its exit code."""
+    """Run the task on standard input, and return the exit code."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one that started this process ends it
-    task: dict[str, Any] = json.loads(_first_line())
+    task: dict[str, Any] = json.loads(_read_first_line())
     threading.Thread(target=_end_with_parent, daemon=True, name="lifeline").start()
     try:
         _TASKS[task.pop("task")](**task, on_done=lambda count: print(f"done {count}", flush=True))
@@ -32,8 +32,8 @@ def main() -> int:
     return 0
 
 
-def _first_line() -> bytes:
-    """The input to its first end of a line, and nothing after it."""
+def _read_first_line() -> bytes:
+    """Bytes of standard input to the first line end, and nothing after it."""
     line = b""
     while not line.endswith(b"\n"):
         part = os.read(0, 1 << 16)
@@ -44,7 +44,7 @@ def _first_line() -> bytes:
 
 
 def _end_with_parent() -> None:
-    """Ends this process when the one that started it does, however that ends: it holds our input open."""
+    """End this process when its parent ends in any way: the parent holds standard input open."""
     os.read(0, 1)
     os._exit(1)
 

@@ -30,11 +30,11 @@ OnProgress = Callable[[float, str], None]
 LONGER_SIDE_PIXELS = 800
 """Longer side of the photos that are compared; errors are in pixels of this size."""
 
-MAX_FEATURES = 1500
-"""Features of a photo, at most."""
+MAX_MEASURED_FEATURES = 1500
+"""Maximum number of features of a photo."""
 
-MAX_PHOTOS = 100
-"""Photos that are compared, at most, evenly among all."""
+MAX_MEASURED_PHOTOS = 100
+"""Maximum number of compared photos, evenly among all."""
 
 NEIGHBOR_RANKS = (0, 2, 4)
 """Ranks of the cameras, by distance in pose, that each is compared with."""
@@ -43,10 +43,10 @@ SEQUENCE_STEPS = (1, 2)
 """Offsets in the order of names of the photos that each is compared with."""
 
 MIN_INLIERS = 20
-"""Matches of one two-view geometry that a pair must have to count."""
+"""Minimum number of matches of one two-view geometry for a pair to count."""
 
-MAX_RATIO = 0.8
-"""Angle to the nearest descriptor over the angle to the second nearest, at most (Lowe, 2004)."""
+MAX_ANGLE_RATIO = 0.8
+"""Maximum ratio of the angles to the nearest and to the second nearest descriptor (Lowe, 2004)."""
 
 MAX_RANSAC_ERROR_PIXELS = 2.0
 MAX_RANSAC_TRIALS = 1000
@@ -55,24 +55,24 @@ PHOTO_QUANTILE = 0.3
 """Quantile of a photo's pair errors that is the photo's error: repeated structure falsifies some pairs."""
 
 MAX_MEDIAN_PIXELS = 0.9
-"""Median of the photos' errors from which poses are wrong; right ones have .15 to .65."""
+"""Maximum median of the photos' errors of right poses, which have .15 to .65."""
 
 MAX_TENTH_PIXELS = 4.0
-"""90 % quantile of the photos' errors from which poses are wrong; right ones have up to 1."""
+"""Maximum 90 % quantile of the photos' errors of right poses, which have up to 1."""
 
 MAX_PAIR_PIXELS = 8.0
-"""Error at which that of a pair is capped in the mean over pairs: false matches count no more than others."""
+"""Cap of a pair's error in the mean over pairs, so that false matches have a bounded weight."""
 
 CONTRADICTED_PIXELS = 3.0
-"""Error of a pair from which on its photos contradict the poses."""
+"""Minimum error of a pair whose photos contradict the poses."""
 
 MIN_MATCHED_SHARE = 0.3
-"""Share of the photos that must have a pair, for anything to be said."""
+"""Minimum share of the photos with a pair, for a measurement."""
 
 MAX_FOCAL_SPREAD = 0.03
-"""Spread of the focal lengths of photos of one size (80 % of them, over the median) that one lens has."""
+"""Maximum spread of the focal lengths of photos of one size and one lens (80 % of them, over the median)."""
 
-_FLIP = np.array([1.0, -1.0, -1.0])
+_OPENGL_TO_OPENCV = np.array([1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,12 +100,13 @@ class PoseError:
 
     Attributes:
         median: median of the photos' errors.
-        tenth: 90 % quantile of them.
-        photos: photos with an error of their own.
-        pairs: pairs of photos that were measured.
+        tenth: 90 % quantile of the photos' errors.
+        photos: number of photos with an error of their own.
+        pairs: number of measured pairs of photos.
         size: longer side of the compared photos, in pixels.
         worst: name and error of the worst photo.
-        capped: mean of the pairs' errors, each capped at MAX_PAIR_PIXELS: what corrections are compared by.
+        capped: mean of the pairs' errors, each capped at MAX_PAIR_PIXELS; the measure by which corrections
+        are compared.
         contradicted: share of the pairs above CONTRADICTED_PIXELS.
         focal_spread: largest spread of focal lengths among photos of one size that have one camera each, 0
             where cameras are shared.
@@ -132,7 +133,7 @@ class PoseError:
         return self.focal_spread > MAX_FOCAL_SPREAD
 
     def __str__(self) -> str:
-        """One line: median, worst tenth, number of photos and pairs."""
+        """One line of text: median, 90 % quantile, number of photos and pairs."""
         return (
             f"median epipolar error {self.median:.2f} pixels at {self.size} pixels a side, "
             f"a tenth of the photos above {self.tenth:.2f} ({self.pairs} pairs of {self.photos} photos)"
@@ -141,7 +142,7 @@ class PoseError:
 
 @dataclass(eq=False)
 class _Photo:
-    """A compared photo: its camera at that size, features [K,2], unit descriptors [K,128]."""
+    """Compared photo: its camera at that size, features [K,2], unit descriptors [K,128]."""
 
     camera: Camera
     features: FloatArray
@@ -149,15 +150,15 @@ class _Photo:
 
 
 def match_photos(views: Sequence[View], on_progress: OnProgress | None = None) -> PhotoMatches:
-    """Matches of neighboring photos: neighbors by the given poses and by the order of names.
+    """Match of neighboring photos: neighbors by the given poses and by the order of names.
 
     Raises DatasetError where a photo cannot be read.
     """
-    ordered = in_order(views)
-    ordered = ordered[:: max(1, -(-len(ordered) // MAX_PHOTOS))]
+    ordered = sort_views(views)
+    ordered = ordered[:: max(1, -(-len(ordered) // MAX_MEASURED_PHOTOS))]
     pycolmap = features.engine()
     options = pycolmap.FeatureExtractionOptions(use_gpu=False, num_threads=1)
-    options.sift.max_num_features = MAX_FEATURES
+    options.sift.max_num_features = MAX_MEASURED_FEATURES
     options.sift.first_octave = 0
     with features.quiet():
         extractor = pycolmap.FeatureExtractor.create(options, pycolmap.Device.cpu)
@@ -166,24 +167,24 @@ def match_photos(views: Sequence[View], on_progress: OnProgress | None = None) -
             photos.append(_photo(pycolmap, view, extractor))
             features.share(on_progress, 0.0, 0.7)(number / len(ordered), f"features of {number} photos")
         pairs = neighbor_pairs([photo.camera for photo in photos])
-        kept: list[tuple[int, int]] = []
+        matched_pairs: list[tuple[int, int]] = []
         pixels: list[tuple[FloatArray, FloatArray]] = []
         for number, (i, j) in enumerate(pairs, start=1):
-            found = _matched(pycolmap, photos[i], photos[j])
+            found = _match_pair(pycolmap, photos[i], photos[j])
             if len(found) >= MIN_INLIERS:
-                kept.append((i, j))
+                matched_pairs.append((i, j))
                 pixels.append((photos[i].features[found[:, 0]], photos[j].features[found[:, 1]]))
             features.share(on_progress, 0.7, 1.0)(number / len(pairs), f"{number} of {len(pairs)} pairs")
     return PhotoMatches(
         names=tuple(view.name for view in ordered),
         sizes=tuple((photo.camera.width, photo.camera.height) for photo in photos),
-        pairs=tuple(kept),
+        pairs=tuple(matched_pairs),
         pixels=tuple(pixels),
         tried=len(pairs),
     )
 
 
-def in_order(views: Iterable[View]) -> list[View]:
+def sort_views(views: Iterable[View]) -> list[View]:
     """Views in the order of their names, numbers in these by value."""
     return sorted(views, key=lambda view: natural_key(view.name))
 
@@ -195,10 +196,10 @@ def pose_error(matches: PhotoMatches, views: Sequence[View]) -> PoseError | None
         by_name[name].camera.resized(*size) for name, size in zip(matches.names, matches.sizes, strict=True)
     ]
     errors: list[list[float]] = [[] for _ in cameras]
-    every = []
+    all_errors = []
     for (i, j), (first, second) in zip(matches.pairs, matches.pixels, strict=True):
         error = float(np.median(epipolar_errors(cameras[i], cameras[j], first, second)))
-        every.append(error)
+        all_errors.append(error)
         errors[i].append(error)
         errors[j].append(error)
     measured = [n for n, found in enumerate(errors) if found]
@@ -214,16 +215,16 @@ def pose_error(matches: PhotoMatches, views: Sequence[View]) -> PoseError | None
         size=max(map(max, matches.sizes)),
         worst=(matches.names[measured[worst]], float(values[worst])),
         focal_spread=focal_spread([view.camera for view in views]),
-        capped=float(np.mean(np.minimum(every, MAX_PAIR_PIXELS))),
-        contradicted=float(np.mean(np.array(every) > CONTRADICTED_PIXELS)),
+        capped=float(np.mean(np.minimum(all_errors, MAX_PAIR_PIXELS))),
+        contradicted=float(np.mean(np.array(all_errors) > CONTRADICTED_PIXELS)),
     )
 
 
 def epipolar_errors(one: Camera, other: Camera, first: FloatArray, second: FloatArray) -> FloatArray:
-    """Errors [K], in pixels, of matched pixels `first` [K,2] of camera `one` and `second` of camera `other`.
+    """Epipolar errors [K], in pixels, of matched pixels `first` [K,2] of camera `one` and `second` of camera
+    `other`.
 
-    0 for cameras in one place, of which every match is possible but by its direction: the angle between both
-    rays takes the place of the epipolar plane then.
+    For cameras in one place the epipolar plane is undefined, and the error is the angle between both rays.
     """
     a, b = _directions(one, first), _directions(other, second)
     baseline = other.origin - one.origin
@@ -232,9 +233,9 @@ def epipolar_errors(one: Camera, other: Camera, first: FloatArray, second: Float
         normal = np.cross(d, baseline)
         length = np.linalg.norm(normal, axis=1)
         sine = np.abs(np.einsum("ni,ni->n", normal, e)) / np.maximum(length, 1e-300)
-        turn = np.linalg.norm(np.cross(d, e), axis=1)
+        sine_between = np.linalg.norm(np.cross(d, e), axis=1)
         errors = np.maximum(
-            errors, camera.fx * np.where(length > 1e-9 * np.linalg.norm(baseline), sine, turn)
+            errors, camera.fx * np.where(length > 1e-9 * np.linalg.norm(baseline), sine, sine_between)
         )
     return errors
 
@@ -242,8 +243,8 @@ def epipolar_errors(one: Camera, other: Camera, first: FloatArray, second: Float
 def focal_spread(cameras: Sequence[Camera]) -> float:
     """Largest spread of the focal lengths of cameras of one size and lens, over their median.
 
-    The spread is that between the 10 % and the 90 % quantile. 0 where fewer than half of the cameras of a
-    size have intrinsics of their own: the file shares cameras, and says which photos have which.
+    The spread is the difference of the 10 % and the 90 % quantile. 0 where fewer than half of the cameras of
+    a size have intrinsics of their own: the file then says which photos share a camera.
     """
     largest = 0.0
     for size in {(camera.width, camera.height, camera.model) for camera in cameras}:
@@ -256,7 +257,7 @@ def focal_spread(cameras: Sequence[Camera]) -> float:
 
 
 def neighbor_pairs(cameras: Sequence[Camera]) -> list[tuple[int, int]]:
-    """Pairs (i, j), i < j, of cameras near each other in pose, and of those near each other in order."""
+    """Pairs (i, j), i < j, of cameras near each other in pose or in order."""
     count = len(cameras)
     origins = np.stack([camera.origin for camera in cameras])
     forward = np.stack([camera.forward for camera in cameras])
@@ -282,7 +283,7 @@ def _photo(pycolmap: Any, view: View, extractor: Any) -> _Photo:
         gray = gray.resize(size, Image.Resampling.BOX)
     keypoints, descriptors = extractor.extract_from_uint8_array(np.ascontiguousarray(np.asarray(gray)))
     positions = np.asarray(pycolmap.keypoints_to_matrix(keypoints), np.float64)[:, :2]
-    used = np.ones(len(positions), dtype=bool)
+    is_used = np.ones(len(positions), dtype=bool)
     valid = view.valid_pixels()
     if pixels.shape[2] == 4:
         opaque = pixels[..., 3] > 127
@@ -290,45 +291,45 @@ def _photo(pycolmap: Any, view: View, extractor: Any) -> _Photo:
     if valid is not None and len(positions):
         at = (positions * (valid.shape[1] / size[0], valid.shape[0] / size[1])).astype(np.intp)
         at = np.clip(at, 0, (valid.shape[1] - 1, valid.shape[0] - 1))
-        used = valid[at[:, 1], at[:, 0]]
-    rows = np.asarray(descriptors.data, np.float32)[used]
+        is_used = valid[at[:, 1], at[:, 0]]
+    rows = np.asarray(descriptors.data, np.float32)[is_used]
     rows /= np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-9)
-    return _Photo(view.camera.resized(*size), positions[used], rows)
+    return _Photo(view.camera.resized(*size), positions[is_used], rows)
 
 
-def _matched(pycolmap: Any, one: _Photo, other: _Photo) -> npt.NDArray[np.intp]:
+def _match_pair(pycolmap: Any, one: _Photo, other: _Photo) -> npt.NDArray[np.intp]:
     """Rows (i, j) [K,2] of the matches that agree with one two-view geometry."""
-    nothing = np.zeros((0, 2), dtype=np.intp)
+    no_matches = np.zeros((0, 2), dtype=np.intp)
     if min(len(one.features), len(other.features)) < MIN_INLIERS:
-        return nothing
-    likeness = one.descriptors @ other.descriptors.T
-    rows = np.arange(len(likeness))
-    best, back = likeness.argmax(axis=1), likeness.argmax(axis=0)
-    nearest = likeness[rows, best]
-    likeness[rows, best] = -1.0
-    second = likeness.max(axis=1)
-    ratio = np.arccos(np.clip(nearest, -1.0, 1.0)) < MAX_RATIO * np.arccos(np.clip(second, -1.0, 1.0))
-    mutual = np.flatnonzero(ratio & (back[best] == rows))
+        return no_matches
+    cosines = one.descriptors @ other.descriptors.T
+    rows = np.arange(len(cosines))
+    best, reverse_best = cosines.argmax(axis=1), cosines.argmax(axis=0)
+    nearest = cosines[rows, best]
+    cosines[rows, best] = -1.0
+    second = cosines.max(axis=1)
+    ratio = np.arccos(np.clip(nearest, -1.0, 1.0)) < MAX_ANGLE_RATIO * np.arccos(np.clip(second, -1.0, 1.0))
+    mutual = np.flatnonzero(ratio & (reverse_best[best] == rows))
     if len(mutual) < MIN_INLIERS:
-        return nothing
+        return no_matches
     options = pycolmap.TwoViewGeometryOptions(detect_watermark=False)
     options.ransac.random_seed = 0
     options.ransac.max_error = MAX_RANSAC_ERROR_PIXELS
     options.ransac.max_num_trials = MAX_RANSAC_TRIALS
-    flat = [_flattened(photo.camera, photo.features) for photo in (one, other)]
+    undistorted = [_undistort_pixels(photo.camera, photo.features) for photo in (one, other)]
     found = pycolmap.estimate_two_view_geometry(
         _pinhole(pycolmap, one.camera),
-        flat[0],
+        undistorted[0],
         _pinhole(pycolmap, other.camera),
-        flat[1],
+        undistorted[1],
         np.stack([mutual, best[mutual]], axis=1).astype(np.uint32),
         options,
     )
     return np.asarray(found.inlier_matches, dtype=np.intp).reshape(-1, 2)
 
 
-def _flattened(camera: Camera, pixels: FloatArray) -> FloatArray:
-    """Pixels [K,2] as a lens without distortion has them; those at its rim are held back to 80 degrees."""
+def _undistort_pixels(camera: Camera, pixels: FloatArray) -> FloatArray:
+    """Pixels [K,2] of the lens without its distortion; pixels beyond 80 degrees off the axis are clamped."""
     if camera.model == "pinhole":
         return pixels
     local = _local_directions(camera, pixels)
@@ -348,4 +349,4 @@ def _local_directions(camera: Camera, pixels: FloatArray) -> FloatArray:
 
 def _directions(camera: Camera, pixels: FloatArray) -> FloatArray:
     """Unit world directions [K,3] of pixels [K,2]."""
-    return np.asarray(_local_directions(camera, pixels) * _FLIP @ camera.c2w[:3, :3].T)
+    return np.asarray(_local_directions(camera, pixels) * _OPENGL_TO_OPENCV @ camera.c2w[:3, :3].T)

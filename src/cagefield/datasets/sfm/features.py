@@ -1,6 +1,6 @@
-"""SIFT features of photos and matches between them, by pycolmap, in a database file of COLMAP's.
+"""SIFT features of photos and matches between them, by pycolmap, in a COLMAP database file.
 
-COLMAP measures pixels as cagefield does: the first pixel has its centre at (.5, .5).
+COLMAP and cagefield measure pixels alike: the first pixel has its center at (.5, .5).
 """
 
 from __future__ import annotations
@@ -26,47 +26,48 @@ FloatArray = npt.NDArray[np.float64]
 Pairs = Sequence[tuple[int, int]]
 
 OnProgress = Callable[[float, str], None]
-"""Called with (share done from 0 to 1, a few words)."""
+"""Function of (share done from 0 to 1, a few words)."""
 
-INSTALL = "pip install -U pycolmap"
+INSTALL_COMMAND = "pip install -U pycolmap"
 """Cure of a missing or old pycolmap, at the end of an error message."""
 
-_FATAL = 3  # glog's level that only ends the process
+_FATAL_LOG_LEVEL = 3  # glog's level that only ends the process
 
 # Work is done in batches, so that progress is known without a look into the database: Python's SQLite and
 # pycolmap's own in one process would break each other's locks (sqlite.org, "How To Corrupt An SQLite
 # Database File", 2.2).
-_PHOTOS_AT_ONCE = 8
+_BATCH_PHOTOS = 8
 
-_LITTLE = 8_000_000
-"""Bytes free on a disk, under which they are told where a database fails: COLMAP does not always say why."""
+_LOW_DISK_BYTES = 8_000_000
+"""Free bytes on a disk below which a database error mentions them: COLMAP does not always say why it fails.
+"""
 
 
 @dataclass(frozen=True)
 class Photo:
-    """One photo of the database: its file's name, and the number of its camera."""
+    """Photo of the database: its file's name, and the number of its camera."""
 
     name: str
     camera: int
 
 
 def engine() -> Any:
-    """The module pycolmap. Raises DatasetError where it is missing, or older than 4.2."""
+    """Module pycolmap. Raises DatasetError where it is missing, or older than 4.2."""
     try:
         import pycolmap
     except ImportError:
-        raise DatasetError(f"this needs pycolmap, which is not installed; {INSTALL}") from None
+        raise DatasetError(f"this needs pycolmap, which is not installed; {INSTALL_COMMAND}") from None
     if not hasattr(pycolmap, "CancellationToken"):
-        raise DatasetError(f"this needs pycolmap 4.2 or newer, not {pycolmap.__version__}; {INSTALL}")
+        raise DatasetError(f"this needs pycolmap 4.2 or newer, not {pycolmap.__version__}; {INSTALL_COMMAND}")
     return pycolmap
 
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """pycolmap writes no log while this lasts."""
+    """Suppress pycolmap's log within the context."""
     logging = engine().logging
     level = logging.minloglevel
-    logging.minloglevel = _FATAL
+    logging.minloglevel = _FATAL_LOG_LEVEL
     try:
         yield
     finally:
@@ -74,7 +75,7 @@ def quiet() -> Iterator[None]:
 
 
 def call(function: Callable[..., Any], *args: Any, poll: Callable[[], None] | None = None, **kw: Any) -> Any:
-    """`function(*args, **kw)` of pycolmap's in a thread; Ctrl-C ends it at its next pause.
+    """Result of pycolmap's `function(*args, **kw)`, run in a thread that Ctrl-C ends at its next pause.
 
     `poll` is called several times a second meanwhile.
 
@@ -112,7 +113,7 @@ def call(function: Callable[..., Any], *args: Any, poll: Callable[[], None] | No
 
 @contextlib.contextmanager
 def opened(path: Path) -> Iterator[Any]:
-    """The database in a file, silently. Raises StoppedError with the reason where COLMAP fails."""
+    """Open database of a file, without log. Raises StoppedError with the reason where COLMAP fails."""
     try:
         with quiet(), contextlib.closing(engine().Database.open(path)) as database:
             yield database
@@ -120,16 +121,16 @@ def opened(path: Path) -> Iterator[Any]:
         raise
     except (RuntimeError, ValueError) as error:
         free = shutil.disk_usage(path.parent).free
-        left = f", and {free // 1000} kB are free on its disk" if free < _LITTLE else ""
+        disk_note = f", and {free // 1000} kB are free on its disk" if free < _LOW_DISK_BYTES else ""
         reason = " ".join(str(error).split())
-        cure = left or "; where it stops there again, remove that file"
+        cure = disk_note or "; where it stops there again, remove that file"
         raise StoppedError(f"COLMAP stopped at its database {path}: {reason}{cure}") from error
 
 
 def create_database(path: Path, cameras: Sequence[Any], photos: Sequence[Photo]) -> None:
-    """Writes a database with these pycolmap cameras and photos; photo i becomes image i + 1, frame i + 1.
+    """Write a database with these pycolmap cameras and photos; photo i becomes image i + 1, frame i + 1.
 
-    Camera and rig numbers count from 1 too. It is at `path` whole, or not at all.
+    Camera and rig numbers count from 1 too. The file appears whole, or not at all.
     """
     pycolmap = engine()
     draft = path.with_suffix(".new")
@@ -165,10 +166,10 @@ def extract(
     masks: Path | None = None,
     on_progress: OnProgress | None = None,
 ) -> None:
-    """Finds the features of the photos `names` in the folder `images`; those that have theirs are left.
+    """Find the features of the photos `names` in the folder `images`; photos that have features are skipped.
 
-    At most `features` a photo, in photos shrunk to `longer_side` pixels (positions are of the whole photo).
-    `masks` holds an 8-bit image NAME.png for photos where only features on white count.
+    At most `features` a photo, in photos shrunk to `longer_side` pixels (positions are in the whole photo's
+    pixels). `masks` holds an 8-bit image NAME.png for photos where only features on white count.
 
     Raises StoppedError where COLMAP fails.
     """
@@ -190,7 +191,7 @@ def extract(
     colmap_process.run("finding features", [task], progress)
 
 
-def extract_here(
+def extract_in_process(
     database: str,
     images: str,
     names: Sequence[str],
@@ -199,15 +200,19 @@ def extract_here(
     masks: str | None,
     on_done: Callable[[int], None],
 ) -> None:
-    """The same in this process, which COLMAP ends where it cannot write; `on_done` has the photos done."""
+    """Find the features as `extract` does, in this process; `on_done` is called with the number of photos
+    done.
+
+    COLMAP aborts the process where it cannot write.
+    """
     pycolmap = engine()
     options = pycolmap.FeatureExtractionOptions(use_gpu=False, max_image_size=longer_side)
     options.sift.max_num_features = features
     reader = pycolmap.ImageReaderOptions()
     if masks is not None:
         reader.mask_path = masks
-    for start in range(0, len(names), _PHOTOS_AT_ONCE):
-        batch = list(names[start : start + _PHOTOS_AT_ONCE])
+    for start in range(0, len(names), _BATCH_PHOTOS):
+        batch = list(names[start : start + _BATCH_PHOTOS])
         call(
             pycolmap.extract_features,
             Path(database),
@@ -221,35 +226,35 @@ def extract_here(
 
 
 def all_pairs(count: int) -> list[tuple[int, int]]:
-    """Every pair of `count` photos."""
+    """Every pair (i, j), i < j, of `count` photos."""
     return [(i, j) for i in range(count) for j in range(i + 1, count)]
 
 
-def likely_pairs(
-    database: Path, count: int, *, neighbours: int = 8, alike: int = 16
+def select_likely_pairs(
+    database: Path, count: int, *, neighbors: int = 8, similar: int = 16
 ) -> list[tuple[int, int]]:
-    """Pairs (i, j) of `count` photos that may show the same: near in order, or alike in their features.
+    """Pairs (i, j) of `count` photos that may overlap: near in order, or with similar features.
 
-    Each photo is paired with the next `neighbours`, those 16, 32, 64 further on, and the `alike` photos whose
-    aggregated features (VLAD: residuals of the descriptors to 32 words, summed, roots, unit length) are most
-    like its own.
+    Each photo is paired with the next `neighbors`, the 16th, 32nd and 64th photo after it, and the `similar`
+    photos whose aggregated features (VLAD: residuals of the descriptors to 32 words, summed, roots, unit
+    length) are most like its own.
 
     Source: Jégou et al., "Aggregating local descriptors into a compact image representation" (2010).
     """
     from scipy.cluster.vq import kmeans2
 
-    steps = [*range(1, neighbours + 1), 16, 32, 64]
+    steps = [*range(1, neighbors + 1), 16, 32, 64]
     pairs = {(i, i + step) for i in range(count) for step in steps if i + step < count}
     with opened(database) as source:
         descriptors = [_descriptors(source, index + 1) for index in range(count)]
     sample = np.concatenate([d[:: max(1, len(d) * count // 20000)] for d in descriptors])
     if len(sample) >= 64:
         words, _ = kmeans2(sample, 32, iter=12, minit="points", seed=0)
-        summed = np.stack([_vlad(d, words) for d in descriptors])
-        likeness = summed @ summed.T
-        np.fill_diagonal(likeness, -np.inf)
+        aggregated = np.stack([_vlad(d, words) for d in descriptors])
+        similarity = aggregated @ aggregated.T
+        np.fill_diagonal(similarity, -np.inf)
         for i in range(count):
-            nearest = np.argsort(-likeness[i], kind="stable")[:alike]
+            nearest = np.argsort(-similarity[i], kind="stable")[:similar]
             pairs |= {(min(i, j), max(i, j)) for j in nearest.tolist()}
     return sorted(pairs)
 
@@ -265,16 +270,16 @@ def _descriptors(database: Any, image_id: int) -> npt.NDArray[np.float32]:
 
 
 def _vlad(descriptors: npt.NDArray[np.float32], words: npt.NDArray[np.float32]) -> FloatArray:
-    """Unit vector [words x 128]; zeros without descriptors."""
+    """Unit VLAD vector [words x 128] of descriptors; zeros without descriptors."""
     nearest = (descriptors @ words.T - 0.5 * (words**2).sum(axis=1)).argmax(axis=1)
-    summed = np.zeros(words.shape)
-    np.add.at(summed, nearest, descriptors - words[nearest])
-    rooted = np.sign(summed.ravel()) * np.sqrt(np.abs(summed.ravel()))
+    aggregated = np.zeros(words.shape)
+    np.add.at(aggregated, nearest, descriptors - words[nearest])
+    rooted = np.sign(aggregated.ravel()) * np.sqrt(np.abs(aggregated.ravel()))
     return np.asarray(rooted / max(np.linalg.norm(rooted), 1e-12), np.float64)
 
 
 def share(on_progress: OnProgress | None, start: float, end: float) -> OnProgress:
-    """Progress of a stage that goes from `start` to `end` of the whole."""
+    """Progress function of a stage that covers `start` to `end` of the whole."""
 
     def move(done: float, note: str) -> None:
         if on_progress is not None:
@@ -283,8 +288,8 @@ def share(on_progress: OnProgress | None, start: float, end: float) -> OnProgres
     return move
 
 
-def consecutive(groups: Iterable[Any]) -> tuple[list[Any], list[int]]:
-    """The different values in order of appearance, and for each item the number of its own."""
+def number_groups(groups: Iterable[Any]) -> tuple[list[Any], list[int]]:
+    """(distinct values in order of appearance, number of each item's value)."""
     known: dict[Any, int] = {}
     numbers = [known.setdefault(group, len(known)) for group in groups]
     return list(known), numbers

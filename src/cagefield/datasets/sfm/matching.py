@@ -1,8 +1,8 @@
-"""Matches between features of photos, by pycolmap: one thread in each of one or several processes.
+"""Feature matching by pycolmap, with one thread in each of one or several processes.
 
-pycolmap's matcher clusters descriptors with a BLAS that is not safe in threads: with several of them, one run
-in a hundred lost most matches of some pairs. So each process has one thread and, where there are several, a
-copy of the database, and its matches are written into the first one.
+pycolmap's matcher clusters descriptors with a BLAS that is not thread-safe: with several threads, one run in
+a hundred lost most matches of some pairs. So each process has one thread and, where there are several, a copy
+of the database, whose matches are merged into the first one.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from pathlib import Path
 
 from cagefield.datasets.sfm import colmap_process, features
 from cagefield.datasets.sfm.features import OnProgress, Pairs
-from cagefield.datasets.sfm.moving_features import MIN_MATCHES
+from cagefield.datasets.sfm.moving_features import MIN_STATIC_MATCHES
 
-_TILE = 12  # pairs are matched in tiles of so many photos each way, whose descriptors are read once
+_TILE_PHOTOS = 12  # pairs are matched in tiles of so many photos each way, whose descriptors are read once
 
-_FEW = 100
-"""Pairs for which another process, which takes half a second to start, is worth it."""
+_MIN_PAIRS_PER_PROCESS = 100
+"""Minimum number of pairs that is worth another process, which takes half a second to start."""
 
-_MOST_PROCESSES = 8
+_MAX_PROCESSES = 8
 
 
 def match(
@@ -36,18 +36,18 @@ def match(
     on_progress: OnProgress | None = None,
     processes: int | None = None,
 ) -> None:
-    """Matches the features of the photos `names[i]`, `names[j]` for all (i, j) in `pairs`.
+    """Match the features of the photos `names[i]`, `names[j]` for all (i, j) in `pairs`.
 
-    Those that are matched already are left. `verify` fits epipolar geometry to each pair; `several` fits
-    more than one, of things that move on their own, from MIN_MATCHES matches on. The result does not depend
-    on the number of `processes`, which for None is one a core, and fewer for few pairs.
+    Pairs with matches are skipped. `verify` fits epipolar geometry to each pair; `several` fits more than
+    one, of things that move on their own, from MIN_MATCHES matches on. The result does not depend on the
+    number of `processes`, which for None is one a core, and fewer for few pairs.
 
     Raises StoppedError where COLMAP fails.
     """
-    ordered = sorted(pairs, key=lambda pair: (pair[0] // _TILE, pair[1] // _TILE, pair))
+    ordered = sorted(pairs, key=lambda pair: (pair[0] // _TILE_PHOTOS, pair[1] // _TILE_PHOTOS, pair))
     lines = [f"{names[i]} {names[j]}\n" for i, j in ordered]
     if processes is None:
-        processes = min(os.cpu_count() or 1, _MOST_PROCESSES, len(lines) // _FEW)
+        processes = min(os.cpu_count() or 1, _MAX_PROCESSES, len(lines) // _MIN_PAIRS_PER_PROCESS)
     count = max(1, processes)
 
     def progress(done: int) -> None:
@@ -70,7 +70,7 @@ def match(
     progress(len(lines))
 
 
-def match_here(
+def match_in_process(
     database: str,
     folder: str,
     lines: Sequence[str],
@@ -79,9 +79,9 @@ def match_here(
     seed: int,
     on_done: Callable[[int], None],
 ) -> None:
-    """Matches the pairs of names in `lines` in this process, which COLMAP ends where it cannot write.
+    """Match the pairs of names in `lines` in this process, which COLMAP aborts where it cannot write.
 
-    `on_done` has the pairs that are done; `folder` takes a list of some pairs.
+    `on_done` is called with the number of pairs done; the list of a batch of pairs is written to `folder`.
     """
     pycolmap = features.engine()
     options = pycolmap.FeatureMatchingOptions(
@@ -91,11 +91,11 @@ def match_here(
     verification.ransac.random_seed = seed
     if several:
         verification.multiple_models = True
-        verification.min_num_inliers = MIN_MATCHES
+        verification.min_num_inliers = MIN_STATIC_MATCHES
     listing = Path(folder) / "pairs.txt"
     pairing = pycolmap.ImportedPairingOptions(match_list_path=str(listing))
-    for start in range(0, len(lines), _TILE**2):
-        batch = lines[start : start + _TILE**2]
+    for start in range(0, len(lines), _TILE_PHOTOS**2):
+        batch = lines[start : start + _TILE_PHOTOS**2]
         listing.write_text("".join(batch), encoding="utf-8")
         features.call(
             pycolmap.match_image_pairs,
@@ -109,7 +109,7 @@ def match_here(
 
 
 def _merge(source: Path, target: Path) -> None:
-    """Writes what was matched in `source` into `target`; pairs that it has are left."""
+    """Copy the matches and two-view geometries of `source` to `target`, where `target` lacks them."""
     pycolmap = features.engine()
     with features.opened(source) as one, features.opened(target) as other:
         for pair, matches in zip(*one.read_all_matches(), strict=True):

@@ -1,10 +1,10 @@
-"""Features on things that move between photos, such as a backdrop held by hand, removed from matches.
+"""Removal of features on things that move between photos, such as a backdrop held by hand.
 
-A moved backdrop has matches of its own rigid motion, often more than the object in front of it, and
-structure from motion then places photos by the backdrop. Its features tell themselves: in some pair of
-photos from similar directions their verified matches contradict the poses, while other matches agree.
-Features near many such ones, in the photo, are taken for the same thing. Matches of photos from other
-directions do not count: those of two sides that look alike contradict right poses.
+A moved backdrop has matches of its own rigid motion, often more than the object in front of it, and structure
+from motion then places photos by the backdrop. Its features are recognizable: in some pair of photos from
+similar directions their verified matches contradict the poses, while other matches agree. A feature with many
+such features nearby in the photo is taken for part of the moving thing. Matches of photos from other
+directions do not count: matches between two sides that look alike contradict right poses.
 
 Notation: V photos with keypoints [K,2] each; `matches` [M,2] of a pair (i, j) are rows of both.
 """
@@ -28,26 +28,31 @@ Mask = npt.NDArray[np.bool_]
 Pair = tuple[int, int]
 
 CONTRADICTING_SHARE = 0.006
-"""Epipolar error of a match that contradicts the poses, over the photo's longer side; half of it agrees."""
+"""Minimum epipolar error of a match that contradicts the poses, over the photo's longer side; half of it
+agrees.
+"""
 
 MAX_TURN_DEG = 30.0
-"""Angle between the viewing directions of a pair whose matches count, at most."""
+"""Maximum angle between the viewing directions of a pair whose matches count."""
 
-NEIGHBORS = 9
+NEIGHBOR_COUNT = 9
 NEIGHBOR_SHARE = 0.08
-"""Features of a photo that are nearest to one, within this share of its longer side, that decide with it."""
+"""Maximum distance of the NEIGHBOR_COUNT nearest features that decide with one, over the photo's longer side.
+"""
 
 MAX_MOVING_NEIGHBORS = 0.4
-"""Share of a feature's neighbors that move, from which on it moves with them."""
+"""Maximum share of moving neighbors of a feature that counts as static."""
 
 MIN_MOVING_SHARE = 0.2
-"""Share of a photo's matched features that move, from which on the photo shows something that moves."""
+"""Minimum share of moving features among a photo's matched features, for the photo to show something that
+moves.
+"""
 
-MIN_PHOTOS = 4
-"""Photos that show something that moves, from which on its matches are removed."""
+MIN_MOVING_PHOTOS = 4
+"""Minimum number of photos that show something that moves, for matches to be removed."""
 
-MIN_MATCHES = 8
-"""Matches of a pair that are enough where only those on things that stand still are left."""
+MIN_STATIC_MATCHES = 8
+"""Minimum number of static matches of a pair."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +78,14 @@ def read_features(database: Path, count: int) -> MatchedFeatures:
 def pair_errors(
     matched: MatchedFeatures, cameras: Mapping[int, Camera]
 ) -> dict[Pair, tuple[npt.NDArray[np.intp], FloatArray]]:
-    """(matches [M,2], epipolar errors [M] over the longer side) of pairs from similar directions.
+    """(matches [M,2], epipolar errors [M] over the longer side) of each pair from similar directions.
 
-    `cameras` are those of the placed photos.
+    `cameras` belong to the registered photos.
     """
     found = {}
-    least_cosine = np.cos(np.radians(MAX_TURN_DEG))
+    min_cosine = np.cos(np.radians(MAX_TURN_DEG))
     for (i, j), rows in matched.matches.items():
-        if i not in cameras or j not in cameras or cameras[i].forward @ cameras[j].forward < least_cosine:
+        if i not in cameras or j not in cameras or cameras[i].forward @ cameras[j].forward < min_cosine:
             continue
         if len(rows):
             pixels = matched.keypoints[i][rows[:, 0]], matched.keypoints[j][rows[:, 1]]
@@ -90,27 +95,31 @@ def pair_errors(
 
 
 def moving_features(matched: MatchedFeatures, cameras: Mapping[int, Camera]) -> tuple[list[Mask], list[int]]:
-    """(features [K] by photo that move, numbers of the photos that show something that moves)."""
-    against = [np.zeros(len(points), np.intp) for points in matched.keypoints]
-    agreeing = [np.zeros(len(points), np.intp) for points in matched.keypoints]
+    """(mask [K] of the moving features of each photo, numbers of the photos that show something that
+    moves).
+    """
+    contradicting_counts = [np.zeros(len(points), np.intp) for points in matched.keypoints]
+    agreeing_counts = [np.zeros(len(points), np.intp) for points in matched.keypoints]
     for (i, j), (rows, errors) in pair_errors(matched, cameras).items():
         for photo, column in ((i, 0), (j, 1)):
-            np.add.at(against[photo], rows[errors > CONTRADICTING_SHARE, column], 1)
-            np.add.at(agreeing[photo], rows[errors < 0.5 * CONTRADICTING_SHARE, column], 1)
+            np.add.at(contradicting_counts[photo], rows[errors > CONTRADICTING_SHARE, column], 1)
+            np.add.at(agreeing_counts[photo], rows[errors < 0.5 * CONTRADICTING_SHARE, column], 1)
     moving, photos = [], []
     for photo, points in enumerate(matched.keypoints):
-        alone = against[photo] > 0
-        seen = np.flatnonzero(alone | (agreeing[photo] > 0))
-        moves = alone.copy()
-        if photo in cameras and len(seen) > NEIGHBORS:
-            reach = NEIGHBOR_SHARE * max(cameras[photo].width, cameras[photo].height)
-            distance, rows = cKDTree(points[seen]).query(points, NEIGHBORS, distance_upper_bound=reach)
+        contradicts = contradicting_counts[photo] > 0
+        matched_rows = np.flatnonzero(contradicts | (agreeing_counts[photo] > 0))
+        is_moving = contradicts.copy()
+        if photo in cameras and len(matched_rows) > NEIGHBOR_COUNT:
+            radius_pixels = NEIGHBOR_SHARE * max(cameras[photo].width, cameras[photo].height)
+            distance, rows = cKDTree(points[matched_rows]).query(
+                points, NEIGHBOR_COUNT, distance_upper_bound=radius_pixels
+            )
             near = np.isfinite(distance)
-            votes = np.append(alone[seen], False)[rows] & near
-            moves |= votes.sum(axis=1) > MAX_MOVING_NEIGHBORS * np.maximum(near.sum(axis=1), 1)
-            if moves[seen].mean() > MIN_MOVING_SHARE:
+            votes = np.append(contradicts[matched_rows], False)[rows] & near
+            is_moving |= votes.sum(axis=1) > MAX_MOVING_NEIGHBORS * np.maximum(near.sum(axis=1), 1)
+            if is_moving[matched_rows].mean() > MIN_MOVING_SHARE:
                 photos.append(photo)
-        moving.append(moves)
+        moving.append(is_moving)
     return moving, photos
 
 
@@ -119,29 +128,30 @@ def capped_error(matched: MatchedFeatures, cameras: Mapping[int, Camera]) -> flo
     errors = [
         min(float(np.median(errors)), 2.0 * CONTRADICTING_SHARE)
         for rows, errors in pair_errors(matched, cameras).values()
-        if len(rows) >= MIN_MATCHES
+        if len(rows) >= MIN_STATIC_MATCHES
     ]
     return float(np.mean(errors)) if errors else float("inf")
 
 
 def remove_features(database: Path, moving: Sequence[Mask]) -> list[Pair]:
-    """Takes the matches of moving features out of a database; the pairs that have lost some and have enough.
+    """Remove the matches of moving features from a database, and return the changed pairs with enough matches
+    left.
 
-    These are no longer verified.
+    The returned pairs have to be verified again.
     """
     pycolmap = features.engine()
-    left = []
+    changed_pairs = []
     with features.opened(database) as source:
         for number, rows in zip(*source.read_all_matches(), strict=True):
             first, second = pycolmap.pair_id_to_image_pair(number)
             rows = np.asarray(rows, np.uint32).reshape(-1, 2)
-            gone = moving[first - 1][rows[:, 0]] | moving[second - 1][rows[:, 1]]
-            if not gone.any():
+            is_removed = moving[first - 1][rows[:, 0]] | moving[second - 1][rows[:, 1]]
+            if not is_removed.any():
                 continue
             source.delete_matches(first, second)
             if source.exists_two_view_geometry(first, second):
                 source.delete_two_view_geometry(first, second)
-            if (~gone).sum() >= MIN_MATCHES:
-                source.write_matches(first, second, rows[~gone])
-                left.append((first - 1, second - 1))
-    return left
+            if (~is_removed).sum() >= MIN_STATIC_MATCHES:
+                source.write_matches(first, second, rows[~is_removed])
+                changed_pairs.append((first - 1, second - 1))
+    return changed_pairs

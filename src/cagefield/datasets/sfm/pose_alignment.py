@@ -17,51 +17,50 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 
 MAX_MEDIAN_TURN_DEG = 15.0
-"""Median angle between aligned orientations, above which two sets of poses have nothing in common."""
+"""Maximum median angle between aligned orientations of poses that agree."""
 
 MAX_MEDIAN_OFFSET = 0.3
-"""Median offset between aligned positions, in shares of their spread, from which poses disagree."""
+"""Maximum median offset between aligned positions of poses that agree, over the positions' spread."""
 
-ROUNDS = 50
+MAX_ITERATIONS = 50
 
 
 @dataclass(frozen=True, eq=False)
 class Similarity:
-    """The map x -> scale rotation x + translation; rotation [3,3], translation [3]."""
+    """Map x -> scale rotation x + translation; rotation [3,3], translation [3]."""
 
     scale: float
     rotation: FloatArray
     translation: FloatArray
 
-    def moved(self, points: FloatArray) -> FloatArray:
-        """Points [N,3] moved."""
+    def transform_points(self, points: FloatArray) -> FloatArray:
+        """Points [N,3] mapped by the similarity."""
         return np.asarray(self.scale * (points @ self.rotation.T) + self.translation)
 
-    def moved_pose(self, c2w: FloatArray) -> FloatArray:
-        """Camera-to-world pose [4,4] moved; its rotation stays without scale."""
+    def transform_pose(self, c2w: FloatArray) -> FloatArray:
+        """Camera-to-world pose [4,4] mapped by the similarity, without scale in its rotation."""
         pose = np.eye(4)
         pose[:3, :3] = self.rotation @ c2w[:3, :3]
-        pose[:3, 3] = self.moved(c2w[None, :3, 3])[0]
+        pose[:3, 3] = self.transform_points(c2w[None, :3, 3])[0]
         return pose
 
 
 def align_poses(poses: FloatArray, target: FloatArray) -> Similarity | None:
     """Similarity that takes camera-to-world `poses` [N,4,4] to `target` [N,4,4]; None where they disagree.
 
-    They disagree where the median turn or offset that is left is above MAX_MEDIAN_TURN_DEG or
-    MAX_MEDIAN_OFFSET.
+    Poses disagree where the median residual turn or offset is above MAX_MEDIAN_TURN_DEG or MAX_MEDIAN_OFFSET.
     """
     relative = target[:, :3, :3] @ poses[:, :3, :3].transpose(0, 2, 1)
     rotation = _median_rotation(relative)
-    turned = poses[:, :3, 3] @ rotation.T
+    rotated = poses[:, :3, 3] @ rotation.T
     origins = target[:, :3, 3]
-    scale, translation = _scale_and_shift(turned, origins)
+    scale, translation = _scale_and_shift(rotated, origins)
     if not scale > 0.0:
         return None
-    turn = np.degrees(np.median(_angles(relative, rotation)))
+    median_turn_deg = np.degrees(np.median(_angles(relative, rotation)))
     spread = float(np.median(np.linalg.norm(origins - np.median(origins, axis=0), axis=1)))
-    offset = float(np.median(np.linalg.norm(scale * turned + translation - origins, axis=1)))
-    if turn > MAX_MEDIAN_TURN_DEG or offset > MAX_MEDIAN_OFFSET * max(spread, 1e-300):
+    offset = float(np.median(np.linalg.norm(scale * rotated + translation - origins, axis=1)))
+    if median_turn_deg > MAX_MEDIAN_TURN_DEG or offset > MAX_MEDIAN_OFFSET * max(spread, 1e-300):
         return None
     return Similarity(scale, rotation, translation)
 
@@ -75,13 +74,13 @@ def _angles(rotations: FloatArray, one: FloatArray) -> FloatArray:
 def _median_rotation(rotations: FloatArray) -> FloatArray:
     """Rotation [3,3] with the least sum of chordal distances to `rotations` [N,3,3]."""
     weights = np.ones(len(rotations))
-    found = np.eye(3)
-    for _ in range(ROUNDS):
+    rotation = np.eye(3)
+    for _ in range(MAX_ITERATIONS):
         left, _, right = np.linalg.svd(np.einsum("n,nij->ij", weights, rotations))
         sign = np.diag([1.0, 1.0, np.linalg.det(left @ right)])
-        found = left @ sign @ right
-        weights = 1.0 / np.maximum(np.linalg.norm(rotations - found, axis=(1, 2)), 1e-9)
-    return found
+        rotation = left @ sign @ right
+        weights = 1.0 / np.maximum(np.linalg.norm(rotations - rotation, axis=(1, 2)), 1e-9)
+    return rotation
 
 
 def _scale_and_shift(points: FloatArray, target: FloatArray) -> tuple[float, FloatArray]:
@@ -92,7 +91,7 @@ def _scale_and_shift(points: FloatArray, target: FloatArray) -> tuple[float, Flo
     weights = np.full(len(points), 1.0 / len(points))
     size = float(np.linalg.norm(target - target.mean(axis=0), axis=1).mean())
     scale, shift = 1.0, np.zeros(3)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ITERATIONS):
         share = weights / weights.sum()
         middle, goal = share @ points, share @ target
         a, b = points - middle, target - goal

@@ -25,22 +25,22 @@ import numpy as np
 import numpy.typing as npt
 
 from cagefield.cameras.camera import Camera
-from cagefield.datasets.colmap.colmap_model import pose_of
+from cagefield.datasets.colmap.colmap_model import image_pose
 from cagefield.datasets.sfm import features, triangulation
 from cagefield.datasets.sfm.epipolar_error import SEQUENCE_STEPS
 from cagefield.datasets.sfm.features import OnProgress, Photo
 from cagefield.datasets.sfm.matching import match
 from cagefield.datasets.sfm.pose_alignment import Similarity, align_poses
 from cagefield.datasets.sfm.registration_report import verified_matches
-from cagefield.datasets.sfm.structure_from_motion import MOST_FOR_ALL_PAIRS, model_camera, reconstruct
+from cagefield.datasets.sfm.structure_from_motion import MAX_EXHAUSTIVE_PHOTOS, model_camera, reconstruct
 from cagefield.datasets.views import SparsePoints, View
 
 FloatArray = npt.NDArray[np.float64]
 
-MAX_FEATURES = 4096
+MAX_ADJUSTMENT_FEATURES = 4096
 
 MIN_RADIAL_PHOTOS = 12
-"""Photos that share a camera, from which on its lens has a second radial term."""
+"""Minimum number of photos that share a camera whose lens has a second radial term."""
 
 FIRST_BOUNDS_PIXELS = (12.0, 80.0)
 """Least and largest bound of the reprojection error in the first round, pixels of the shrunk photos."""
@@ -48,13 +48,13 @@ FIRST_BOUNDS_PIXELS = (12.0, 80.0)
 LAST_BOUND_PIXELS = 3.0
 """Bound of the reprojection error in the last round."""
 
-ROUNDS = 4
+ADJUSTMENT_ROUNDS = 4
 
 MIN_OBSERVATIONS = 15
-"""Observed points that a photo must have for its new pose to count."""
+"""Minimum number of observed points of a photo whose new pose counts."""
 
 MIN_PLACED_SHARE = 0.9
-"""Share of the photos that must keep enough observations."""
+"""Minimum share of photos with enough observations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +65,8 @@ class RefinedPoses:
         cameras: camera at the photo's full size, by name of the view.
         points: sparse points of the reconstruction.
         reprojection_error: mean, pixels of the full-size photos.
-        aligned: whether they are in the given world; not where both sets of poses disagree too much.
-        moving: photos whose features on things that move were left out.
+        aligned: whether the cameras are in the given world, which fails where both sets of poses disagree.
+        moving: number of photos whose features on moving things were left out.
     """
 
     cameras: dict[str, Camera]
@@ -77,15 +77,16 @@ class RefinedPoses:
 
 
 class PoseSolver:
-    """Features and matches of the full-size `views` in `folder`, from which their cameras are found anew.
+    """Solver for the cameras of the full-size `views`, with features and matches in `folder`.
 
-    Raises DatasetError where a photo cannot be read, StoppedError where COLMAP fails; so do the methods.
+    The constructor and the methods raise DatasetError where a photo cannot be read, StoppedError where COLMAP
+    fails.
     """
 
     def __init__(
         self, views: Sequence[View], folder: Path, on_progress: OnProgress | None = None, seed: int = 0
     ) -> None:
-        """Finds features of all photos, and matches of neighbors in pose and in order."""
+        """Find features of all photos, and matches of neighbors in pose and in order."""
         pycolmap = features.engine()
         self._views, self._folder, self._seed = views, folder, seed
         self._shrunk, self._names = triangulation.shrink_views(views, folder, on_progress, square=True)
@@ -98,7 +99,9 @@ class PoseSolver:
         photos = [Photo(n, c) for n, c in zip(self._names, self._numbers, strict=True)]
         features.create_database(self._database, self._cameras, photos)
         extracting = features.share(on_progress, 0.05, 0.5)
-        triangulation.extract_features(self._database, folder, self._names, MAX_FEATURES, extracting)
+        triangulation.extract_features(
+            self._database, folder, self._names, MAX_ADJUSTMENT_FEATURES, extracting
+        )
         near = triangulation.nearest_pairs([one.camera for one in self._shrunk])
         in_order = [(i, i + k) for i in range(len(views)) for k in SEQUENCE_STEPS if i + k < len(views)]
         self._match(sorted({*near, *in_order}), features.share(on_progress, 0.5, 1.0))
@@ -115,50 +118,54 @@ class PoseSolver:
         )
         side = max(max(one.camera.width, one.camera.height) for one in self._shrunk)
         first = float(np.clip(4.0 * expected_error * side, *FIRST_BOUNDS_PIXELS))
-        for number, bound in enumerate(np.geomspace(first, LAST_BOUND_PIXELS, ROUNDS)):
-            model = triangulation.triangulated(
+        for number, bound in enumerate(np.geomspace(first, LAST_BOUND_PIXELS, ADJUSTMENT_ROUNDS)):
+            model = triangulation.triangulate_tracks(
                 pycolmap, model, self._database, self._folder, f"round-{number}", float(bound),
-                least_photos=2, seed=self._seed,
+                min_photos=2, seed=self._seed,
             )  # fmt: skip
             if not model.num_points3D():
                 return None
-            if number == ROUNDS - 1:
+            if number == ADJUSTMENT_ROUNDS - 1:
                 _add_tangential(pycolmap, model, self._tangential)
-            _adjust(pycolmap, model, float(bound), refine_focal=number < ROUNDS - 1)
-            note = f"bundle adjustment {number + 1} of {ROUNDS}"
-            features.share(on_progress, 0.0, 1.0)((number + 1) / ROUNDS, note)
-        return self._collected(model, Similarity(scale, np.eye(3), center))
+            _adjust(pycolmap, model, float(bound), refine_focal=number < ADJUSTMENT_ROUNDS - 1)
+            note = f"bundle adjustment {number + 1} of {ADJUSTMENT_ROUNDS}"
+            features.share(on_progress, 0.0, 1.0)((number + 1) / ADJUSTMENT_ROUNDS, note)
+        return self._collect_poses(model, Similarity(scale, np.eye(3), center))
 
     def rebuild(self, on_progress: OnProgress | None = None) -> RefinedPoses | None:
         """Cameras by structure from motion without the given poses; None where too few photos are placed."""
         count = len(self._views)
-        few = count <= MOST_FOR_ALL_PAIRS
-        pairs = features.all_pairs(count) if few else features.likely_pairs(self._database, count)
+        uses_all_pairs = count <= MAX_EXHAUSTIVE_PHOTOS
+        pairs = (
+            features.all_pairs(count)
+            if uses_all_pairs
+            else features.select_likely_pairs(self._database, count)
+        )
         self._match(pairs, features.share(on_progress, 0.0, 0.5))
         matches = verified_matches(self._database, count)
         mapping = features.share(on_progress, 0.5, 1.0)
         found = reconstruct(self._folder, self._names, matches, self._seed, mapping)
         if not found.models:
             return None
-        collected = self._collected(found.models[0], None)
-        return None if collected is None else replace(collected, moving=len(found.moving))
+        refined = self._collect_poses(found.models[0], None)
+        return None if refined is None else replace(refined, moving=len(found.moving))
 
     def _match(self, pairs: features.Pairs, on_progress: OnProgress) -> None:
         match(self._database, self._names, pairs, verify=True, seed=self._seed, on_progress=on_progress)
 
-    def _collected(self, model: Any, default: Similarity | None) -> RefinedPoses | None:
+    def _collect_poses(self, model: Any, default: Similarity | None) -> RefinedPoses | None:
         """Cameras and points of a reconstruction, aligned to the given poses, else moved by `default`."""
         images = {image_id - 1: model.image(image_id) for image_id in model.reg_image_ids()}
         placed = [n for n, image in sorted(images.items()) if image.num_points3D >= MIN_OBSERVATIONS]
         if len(placed) < max(3, MIN_PLACED_SHARE * len(self._views)):
             return None
-        poses = np.stack([pose_of(images[n]) for n in placed])
+        poses = np.stack([image_pose(images[n]) for n in placed])
         alignment = align_poses(poses, np.stack([self._views[n].camera.c2w for n in placed]))
         to_world = alignment or default or Similarity(1.0, np.eye(3), np.zeros(3))
         cameras = {}
         for n, pose in zip(placed, poses, strict=True):
             view = self._views[n]
-            posed = model_camera(model, images[n]).with_c2w(to_world.moved_pose(pose))
+            posed = model_camera(model, images[n]).with_c2w(to_world.transform_pose(pose))
             cameras[view.name] = posed.resized(view.camera.width, view.camera.height)
         points = triangulation.collect_points(model, self._shrunk, None, to_world)
         shrinking = float(np.mean([one.scale for one in self._shrunk]))
@@ -169,8 +176,8 @@ class PoseSolver:
 def camera_groups(cameras: Sequence[Camera]) -> list[int]:
     """Number of the shared camera of each photo.
 
-    Photos of one size and lens share one; where the given intrinsics are shared by at least two photos on
-    average, those that share them do.
+    Photos of one size and lens share a camera; where the given intrinsics are shared by at least two photos
+    on average, the photos with equal intrinsics share one.
     """
     sizes = [(camera.width, camera.height, camera.model == "opencv_fisheye") for camera in cameras]
     intrinsics = [
@@ -178,7 +185,7 @@ def camera_groups(cameras: Sequence[Camera]) -> list[int]:
         for size, camera in zip(sizes, cameras, strict=True)
     ]
     grouped = 2 * len(set(intrinsics)) <= len(cameras)
-    return features.consecutive(intrinsics if grouped else sizes)[1]
+    return features.number_groups(intrinsics if grouped else sizes)[1]
 
 
 def shared_cameras(pycolmap: Any, cameras: Sequence[Camera]) -> tuple[list[int], list[Any]]:
@@ -194,14 +201,14 @@ def shared_cameras(pycolmap: Any, cameras: Sequence[Camera]) -> tuple[list[int],
             model, params = "RADIAL", [middle[:2].mean(), middle[2], middle[3], lens[0], lens[1]]
         else:
             model, params = "SIMPLE_RADIAL", [middle[:2].mean(), middle[2], middle[3], lens[0]]
-        made = pycolmap.Camera(model=model, width=group[0].width, height=group[0].height, params=params)
-        made.has_prior_focal_length = True
-        shared.append(made)
+        camera = pycolmap.Camera(model=model, width=group[0].width, height=group[0].height, params=params)
+        camera.has_prior_focal_length = True
+        shared.append(camera)
     return numbers, shared
 
 
 def _groups(cameras: Sequence[Camera], numbers: Sequence[int]) -> list[list[Camera]]:
-    """Cameras by the number of their shared camera."""
+    """Cameras of each group of photos that share a camera."""
     return [
         [camera for camera, n in zip(cameras, numbers, strict=True) if n == number]
         for number in range(max(numbers) + 1)
@@ -209,7 +216,7 @@ def _groups(cameras: Sequence[Camera], numbers: Sequence[int]) -> list[list[Came
 
 
 def _add_tangential(pycolmap: Any, model: Any, wanted: Sequence[bool]) -> None:
-    """Turns radial cameras of which tangential distortion is wanted into OPENCV ones without any yet."""
+    """Change radial camera models to OPENCV, with zero tangential distortion, where `wanted`."""
     for camera_id, camera in model.cameras.items():
         if wanted[camera_id - 1] and camera.model.name in ("RADIAL", "SIMPLE_RADIAL"):
             focal, cx, cy, k1, k2 = (*camera.params, 0.0)[:5]
@@ -218,7 +225,7 @@ def _add_tangential(pycolmap: Any, model: Any, wanted: Sequence[bool]) -> None:
 
 
 def _adjust(pycolmap: Any, model: Any, bound: float, refine_focal: bool) -> None:
-    """Bundle adjustment of everything, after which observations with more than half the bound are removed."""
+    """Bundle-adjust poses, intrinsics and points, then remove observations with more than half the bound."""
     options = pycolmap.BundleAdjustmentOptions(print_summary=False, refine_focal_length=refine_focal)
     options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
     options.ceres.loss_function_scale = max(1.0, 0.1 * bound)

@@ -1,11 +1,11 @@
 """Verification of the poses that come with photos, and their correction.
 
-The poses are measured (`pose_check`, `folds`). Right ones are left as they are. Wrong ones are
-bundle-adjusted (`pose_refinement`); where that does not cure them, structure from motion finds new ones from
-the photos. The data set gets the poses with the least epipolar error, in its given world where they agree
-with the given ones enough to tell where that is.
+The poses are measured (`epipolar_error`, `ambiguity_check`). Right poses are unchanged. Wrong poses are
+bundle-adjusted (`pose_refinement`); where the adjustment does not cure them, structure from motion finds new
+poses from the photos. The data set gets the poses with the least epipolar error, in its given world where
+enough of them agree with the given ones.
 
-Figures and corrections are kept in the user's cache, under a digest of photos and given cameras.
+Figures and corrections are stored in the user's cache, under a digest of photos and given cameras.
 """
 
 from __future__ import annotations
@@ -22,8 +22,14 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.cameras.camera import Camera
 from cagefield.datasets.scene_bounds import cube_of_interest, depth_range
-from cagefield.datasets.sfm.ambiguity_check import Fold, find_fold
-from cagefield.datasets.sfm.epipolar_error import PhotoMatches, PoseError, in_order, match_photos, pose_error
+from cagefield.datasets.sfm.ambiguity_check import Fold, check_ambiguity
+from cagefield.datasets.sfm.epipolar_error import (
+    PhotoMatches,
+    PoseError,
+    match_photos,
+    pose_error,
+    sort_views,
+)
 from cagefield.datasets.sfm.pose_refinement import PoseSolver, RefinedPoses
 from cagefield.datasets.sfm.sparse_points import capture_key, read_cached_points, write_cached_points
 from cagefield.datasets.views import Dataset, View
@@ -38,30 +44,32 @@ Outcome = Literal["unmeasured", "kept", "adjusted", "rebuilt"]
 OnStage = Callable[[str, float, str], None]
 
 MAX_GAIN = 0.7
-"""Epipolar error after over before, at most, for corrected poses that are still called wrong."""
+"""Maximum ratio of epipolar errors after and before, for accepting corrected poses that are still called
+wrong.
+"""
 
 MAX_CONTRADICTED = 0.05
-"""Share of pairs that contradict adjusted poses, above which structure from motion is tried too."""
+"""Maximum share of pairs that contradict adjusted poses, above which structure from motion is tried too."""
 
 MIN_FOLD_TURN_DEG = 5.0
-"""Turn of a tenth of the photos, at least, by which new poses differ from those of a real fold."""
+"""Minimum turn of a tenth of the photos by which new poses differ from the poses of a real fold."""
 
 MAX_SHARED_GAIN = 1.25
-"""Epipolar error after over before, at most, where only focal lengths are scattered."""
+"""Maximum ratio of epipolar errors after and before, where only focal lengths are scattered."""
 
 _VERSION = b"poses 3"
 
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """A data set whose poses are verified, and the figures.
+    """Data set with verified poses, and the measurements.
 
     Attributes:
-        dataset: the data set itself where its poses are kept, else one with other cameras and points.
+        dataset: the given data set where its poses stay, else one with other cameras and points.
         before, after: epipolar errors of the given poses and of the data set's; None where too few photos
             match.
         fold: photos that contradict each other under the given poses, None without any.
-        outcome: unmeasured and kept leave the poses as they are; adjusted is by bundle adjustment, rebuilt by
+        outcome: unmeasured and kept leave the poses unchanged; adjusted is by bundle adjustment, rebuilt by
             structure from motion.
         aligned: whether the cameras are in the given world.
         left_out: names of views without a new pose.
@@ -80,10 +88,10 @@ class Verification:
     moving: int = 0
 
 
-def all_views(dataset: Dataset) -> list[View]:
-    """All views of a data set once, in the order of their names."""
+def sorted_views(dataset: Dataset) -> list[View]:
+    """All views of a data set once, in natural order of their names."""
     everything = {view.name: view for view in (*dataset.val, *dataset.test, *dataset.train)}
-    return in_order(everything.values())
+    return sort_views(everything.values())
 
 
 def verify_poses(
@@ -94,40 +102,43 @@ def verify_poses(
     on_stage: OnStage = lambda stage, done, note: None,
     seed: int = 0,
 ) -> Verification:
-    """The data set with its poses measured and, with `correct`, corrected where they are wrong.
+    """Data set with its poses measured and, with `correct`, corrected where they are wrong.
 
     Figures and corrections are read from and written to the folder `cache`.
 
     Raises DatasetError where a photo cannot be read, StoppedError where COLMAP fails.
     """
-    views = [view.whole() for view in all_views(dataset)]
+    views = [view.whole() for view in sorted_views(dataset)]
     version = _VERSION + (b" unbounded" if dataset.unbounded else b"")
     file = None if cache is None else cache / f"poses-{capture_key(views, seed, version)}.json"
     findings = None if file is None else _read(file)
     if findings is None or (correct and findings.is_suspect and not findings.searched):
         matches = match_photos(views, partial(on_stage, "Checking poses"))
         if findings is None:
-            fold = find_fold(dataset, partial(on_stage, "Comparing photos")) if dataset.unbounded else None
+            fold = (
+                check_ambiguity(dataset, partial(on_stage, "Comparing photos")) if dataset.unbounded else None
+            )
             findings = _Findings(pose_error(matches, views), fold)
         if correct and findings.is_suspect:
-            findings = _searched(dataset, views, findings, matches, seed, on_stage)
+            findings = _search_corrections(dataset, views, findings, matches, seed, on_stage)
         if file is not None:
             _write(file, findings)
     before, fold = findings.before, findings.fold
     if not correct or findings.corrected is None:
         outcome: Outcome = "unmeasured" if before is None else "kept"
         return Verification(dataset, before, before, fold, outcome, same_fold=findings.same_fold)
-    outcome, found, after = findings.corrected
-    left_out = tuple(view.name for view in views if view.name not in found.cameras)
-    moved = with_cameras(dataset, found)
+    outcome, refined, after = findings.corrected
+    left_out = tuple(view.name for view in views if view.name not in refined.cameras)
+    moved = replace_cameras(dataset, refined)
     return Verification(
-        moved, before, after, fold, outcome, found.aligned, left_out, findings.same_fold, found.moving
+        moved, before, after, fold, outcome, refined.aligned, left_out, findings.same_fold, refined.moving
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Findings:
-    """Figures of given poses, whether better ones were searched for, and (outcome, poses, error) if found.
+    """Measurements of given poses, whether better ones were searched for, and (outcome, poses, error) if
+    found.
 
     `same_fold`: new poses agree with the given ones, so that their fold is doubtful.
     """
@@ -147,7 +158,7 @@ class _Findings:
         )
 
 
-def _searched(
+def _search_corrections(
     dataset: Dataset,
     views: list[View],
     findings: _Findings,
@@ -155,24 +166,24 @@ def _searched(
     seed: int,
     on_stage: OnStage,
 ) -> _Findings:
-    """The findings with the best of the corrected poses, where some are better than the given ones."""
+    """Findings with the best corrected poses, where some are better than the given ones."""
     before, fold = findings.before, findings.fold
     best: tuple[Outcome, RefinedPoses, PoseError | None] | None = None
-    for outcome, found in _corrections(views, before, fold, seed, on_stage):
-        other = with_cameras(dataset, found)
-        after = pose_error(matches, [view.whole() for view in all_views(other)])
-        right = after is None or not after.is_wrong
-        if fold is not None and right and outcome == "rebuilt" and _agrees(dataset, found):
+    for outcome, refined in _corrections(views, before, fold, seed, on_stage):
+        other = replace_cameras(dataset, refined)
+        after = pose_error(matches, [view.whole() for view in sorted_views(other)])
+        is_right = after is None or not after.is_wrong
+        if fold is not None and is_right and outcome == "rebuilt" and _agrees(dataset, refined):
             fold, findings = None, replace(findings, same_fold=True)
             if before is None or not (before.is_wrong or before.has_scattered_focals):
                 break
         if not _is_better(before, after, fold):
             continue
-        if fold is not None and find_fold(other) is not None:
+        if fold is not None and check_ambiguity(other) is not None:
             continue
         # Matches on things that move contradict right poses: they do not decide then.
-        if best is None or found.moving or _capped(after) < _capped(best[2]):
-            best = outcome, found, after
+        if best is None or refined.moving or _capped(after) < _capped(best[2]):
+            best = outcome, refined, after
         after = best[2]
         if after is not None and not after.is_wrong and after.contradicted <= MAX_CONTRADICTED:
             break
@@ -182,17 +193,17 @@ def _searched(
 def _corrections(
     views: list[View], before: PoseError | None, fold: Fold | None, seed: int, on_stage: OnStage
 ) -> Iterator[tuple[Outcome, RefinedPoses]]:
-    """Corrected poses one after the other, the cheapest first: (outcome, poses)."""
+    """(outcome, poses) of each correction, the cheapest first."""
     with TemporaryFolder("points") as folder:
         solver = PoseSolver(views, folder, partial(on_stage, "Matching photos"), seed)
         if before is not None and (before.is_wrong or fold is None):
-            found = solver.refine(before.median / before.size, partial(on_stage, "Adjusting poses"))
-            if found is not None:
-                yield "adjusted", found
+            refined = solver.refine(before.median / before.size, partial(on_stage, "Adjusting poses"))
+            if refined is not None:
+                yield "adjusted", refined
         if fold is not None or (before is not None and before.is_wrong):
-            found = solver.rebuild(partial(on_stage, "Finding poses"))
-            if found is not None:
-                yield "rebuilt", found
+            refined = solver.rebuild(partial(on_stage, "Finding poses"))
+            if refined is not None:
+                yield "rebuilt", refined
 
 
 def _capped(error: PoseError | None) -> float:
@@ -200,9 +211,9 @@ def _capped(error: PoseError | None) -> float:
 
 
 def _is_better(before: PoseError | None, after: PoseError | None, fold: Fold | None) -> bool:
-    """Whether poses with the error `after` take the place of those with the error `before`.
+    """Whether poses with the error `after` are to replace the poses with the error `before`.
 
-    Where neither is known they are judged by the fold alone.
+    Where both errors are None the fold alone decides.
     """
     if after is None:
         return before is None and fold is not None
@@ -217,31 +228,35 @@ def _is_better(before: PoseError | None, after: PoseError | None, fold: Fold | N
     return after.median < MAX_GAIN * before.median and after.capped < MAX_GAIN * before.capped
 
 
-def _agrees(dataset: Dataset, found: RefinedPoses) -> bool:
-    """Whether new poses say the same as the given ones, so that these are not folded."""
-    given = [view.camera.c2w[:3, :3] for view in all_views(dataset) if view.name in found.cameras]
-    new = [found.cameras[view.name].c2w[:3, :3] for view in all_views(dataset) if view.name in found.cameras]
+def _agrees(dataset: Dataset, refined: RefinedPoses) -> bool:
+    """Whether new poses agree with the given ones, so that the given ones are not folded."""
+    given = [view.camera.c2w[:3, :3] for view in sorted_views(dataset) if view.name in refined.cameras]
+    new = [
+        refined.cameras[view.name].c2w[:3, :3]
+        for view in sorted_views(dataset)
+        if view.name in refined.cameras
+    ]
     turns = Rotation.from_matrix(np.stack(given).transpose(0, 2, 1) @ np.stack(new)).magnitude()
-    return found.aligned and bool(np.degrees(np.quantile(turns, 0.9)) < MIN_FOLD_TURN_DEG)
+    return refined.aligned and bool(np.degrees(np.quantile(turns, 0.9)) < MIN_FOLD_TURN_DEG)
 
 
-def with_cameras(dataset: Dataset, found: RefinedPoses) -> Dataset:
-    """The data set with other cameras and points; views without a camera are left out.
+def replace_cameras(dataset: Dataset, refined: RefinedPoses) -> Dataset:
+    """Data set with other cameras and points; views without a camera are left out.
 
-    The cube of interest of an unbounded capture is found anew. In another world than the given one nothing is
-    known of the file's coordinates.
+    The cube of interest of an unbounded capture is estimated again. Where the cameras are not in the given
+    world, the file's coordinates are unknown: `source_to_world` is the identity and `offset` zero.
     """
 
     def moved(views: tuple[View, ...]) -> tuple[View, ...]:
         return tuple(
-            replace(view.whole(), camera=found.cameras[view.name]).downscaled(view.downscale)
+            replace(view.whole(), camera=refined.cameras[view.name]).downscaled(view.downscale)
             for view in views
-            if view.name in found.cameras
+            if view.name in refined.cameras
         )
 
     train, test, val = moved(dataset.train), moved(dataset.test), moved(dataset.val)
     cameras = [view.camera for view in train]
-    positions = None if found.points is None else found.points.positions
+    positions = None if refined.points is None else refined.points.positions
     bounds = cube_of_interest(cameras, points=positions) if dataset.unbounded else dataset.bounds
     return replace(
         dataset,
@@ -250,14 +265,14 @@ def with_cameras(dataset: Dataset, found: RefinedPoses) -> Dataset:
         val=val,
         bounds=bounds,
         depths=depth_range(cameras, positions),
-        points=found.points,
-        source_to_world=dataset.source_to_world if found.aligned else np.eye(4),
-        offset=dataset.offset if found.aligned else (0.0, 0.0, 0.0),
+        points=refined.points,
+        source_to_world=dataset.source_to_world if refined.aligned else np.eye(4),
+        offset=dataset.offset if refined.aligned else (0.0, 0.0, 0.0),
     )
 
 
 def describe(one: Verification) -> list[str]:
-    """Lines about a verification: the error, the correction, photos left out."""
+    """Lines of text about a verification: the error, the correction, photos left out."""
     if one.before is None:
         lines = ["poses: not measured, too few photos have matches with their neighbors"]
     else:
@@ -292,13 +307,13 @@ def describe(one: Verification) -> list[str]:
     return lines
 
 
-def poses_cache() -> Path:
-    """The folder of corrected poses in the user's cache."""
+def poses_cache_folder() -> Path:
+    """Folder of corrected poses in the user's cache."""
     return cache_root() / "poses"
 
 
 def _write(file: Path, findings: _Findings) -> None:
-    """Writes the findings whole or not at all; where the folder cannot be written to, nothing."""
+    """Write the findings whole or not at all; an unwritable folder is ignored."""
     values: dict[str, Any] = {
         "before": None if findings.before is None else asdict(findings.before),
         "fold": None if findings.fold is None else asdict(findings.fold),
@@ -306,17 +321,17 @@ def _write(file: Path, findings: _Findings) -> None:
         "same_fold": findings.same_fold,
     }
     if findings.corrected is not None:
-        outcome, found, after = findings.corrected
+        outcome, refined, after = findings.corrected
         values |= {
             "outcome": outcome,
             "after": None if after is None else asdict(after),
-            "cameras": {name: camera.to_dict() for name, camera in found.cameras.items()},
-            "reprojection_error": found.reprojection_error,
-            "aligned": found.aligned,
-            "moving": found.moving,
+            "cameras": {name: camera.to_dict() for name, camera in refined.cameras.items()},
+            "reprojection_error": refined.reprojection_error,
+            "aligned": refined.aligned,
+            "moving": refined.moving,
         }
-        if found.points is not None:
-            write_cached_points(file.with_suffix(".npz"), found.points)
+        if refined.points is not None:
+            write_cached_points(file.with_suffix(".npz"), refined.points)
     try:
         with replaced_file(file) as draft:
             draft.write_text(json.dumps(values), encoding="utf-8")
@@ -325,11 +340,15 @@ def _write(file: Path, findings: _Findings) -> None:
 
 
 def _read(file: Path) -> _Findings | None:
-    """The findings of a file; None where it is not there or damaged."""
+    """Findings of a file; None where it is missing or damaged."""
     try:
         values = json_text.loads(read_text(file))
-        before, searched, same_fold = _error_of(values["before"]), values["searched"], values["same_fold"]
-        fold = None if values["fold"] is None else _fold_of(values["fold"])
+        before, searched, same_fold = (
+            _parse_pose_error(values["before"]),
+            values["searched"],
+            values["same_fold"],
+        )
+        fold = None if values["fold"] is None else _parse_fold(values["fold"])
         if not (isinstance(searched, bool) and isinstance(same_fold, bool)):
             return None
         if "outcome" not in values:
@@ -339,14 +358,16 @@ def _read(file: Path) -> _Findings | None:
         if outcome not in ("adjusted", "rebuilt") or not isinstance(aligned, bool) or not np.isfinite(error):
             return None
         points, moving = read_cached_points(file.with_suffix(".npz")), int(values["moving"])
-        found = RefinedPoses(cameras, points, error, aligned, moving)
-        return _Findings(before, fold, searched, same_fold, (outcome, found, _error_of(values["after"])))
+        refined = RefinedPoses(cameras, points, error, aligned, moving)
+        return _Findings(
+            before, fold, searched, same_fold, (outcome, refined, _parse_pose_error(values["after"]))
+        )
     except (OSError, ValueError, TypeError, KeyError, AttributeError, CagefieldError):
         return None
 
 
-def _error_of(values: dict[str, Any] | None) -> PoseError | None:
-    """A pose error of a file; raises ValueError, TypeError or KeyError where it is damaged."""
+def _parse_pose_error(values: dict[str, Any] | None) -> PoseError | None:
+    """Pose error of a file; raises ValueError, TypeError or KeyError where it is damaged."""
     if values is None:
         return None
     name, worst = values["worst"]
@@ -359,7 +380,7 @@ def _error_of(values: dict[str, Any] | None) -> PoseError | None:
     return PoseError(median, tenth, photos, pairs, size, one, focal_spread, capped, contradicted)
 
 
-def _fold_of(values: dict[str, Any]) -> Fold:
-    """A fold of a file; raises ValueError, TypeError or KeyError where it is damaged."""
+def _parse_fold(values: dict[str, Any]) -> Fold:
+    """Fold of a file; raises ValueError, TypeError or KeyError where it is damaged."""
     first, second = values["pair"]
     return Fold(int(values["photos"]), int(values["compared"]), (str(first), str(second)))

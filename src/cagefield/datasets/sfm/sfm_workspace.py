@@ -1,7 +1,7 @@
-"""The folder of what structure from motion has done so far, from which an interrupted run continues.
+"""Work folder of structure from motion, from which an interrupted run continues.
 
-It holds upright photos, their copies under plain names for COLMAP, masks, the database of features and
-matches, and what it was made of. Each file in it is whole, or not there.
+It holds write_upright photos, their copies under plain names for COLMAP, masks, the database of features and
+matches, and the record of its source. Each file in it is whole, or missing.
 """
 
 from __future__ import annotations
@@ -18,7 +18,13 @@ from typing import Any
 
 from PIL import Image, ImageChops
 
-from cagefield.datasets.raw_photos import RawPhoto, find_raw_photos, is_video, upright, video_frames
+from cagefield.datasets.raw_photos import (
+    RawPhoto,
+    extract_video_frames,
+    find_raw_photos,
+    is_video,
+    write_upright,
+)
 from cagefield.datasets.sfm.colmap_process import StoppedError
 from cagefield.datasets.sfm.features import OnProgress
 from cagefield.datasets.sfm.raw_masks import VALID_FOLDER, RawMasks
@@ -31,46 +37,46 @@ from cagefield.files.stale_files import hidden_name, remove_leftovers
 DATABASE = "database.db"
 """Name of COLMAP's database of features and matches in the work folder."""
 
-_VERSION = 1
+_RECORD_VERSION = 1
 
-_PLAIN = rb"[ !#-\[\]-~]*"
-_PHOTO = re.compile(
+_PLAIN_CHARACTERS = rb"[ !#-\[\]-~]*"
+_PHOTO_ENTRY = re.compile(
     rb'\["'
-    + _PLAIN
+    + _PLAIN_CHARACTERS
     + rb'(?:\\(?:["\\/bfnrt]|u[0-9a-f]{4})'
-    + _PLAIN
+    + _PLAIN_CHARACTERS
     + rb')*", (?:0|[1-9]\d*), (?:0|-?[1-9]\d*)\], (?=\[")'
 )
-"""A photo of a record, as `json.dumps` writes it, before another one."""
+"""Pattern of a photo in a record, as `json.dumps` writes it, before another one."""
 
-_PHOTOS = b'"files": ['
+_FILES_KEY = b'"files": ['
 
-_LONGEST_REST = 1 << 16
-"""Bytes of a record beside its photos but the last, at most."""
+_MAX_REST_BYTES = 1 << 16
+"""Maximum bytes of a record without its photos but the last."""
 
-_LONGEST = 1 << 20
-"""Pixels of a photo's side: none is longer. Its square is above all focal lengths."""
+_MAX_SIDE_PIXELS = 1 << 20
+"""Maximum side of a photo. Its square exceeds all focal lengths."""
 
 
 def work_folder(target: Path) -> Path:
-    """The folder beside `target` that an interrupted run leaves."""
+    """Work folder of an interrupted run, beside `target`."""
     return target.with_name(target.name + ".work")
 
 
 def prepare_work(work: Path, record: Mapping[str, Any]) -> None:
-    """The work folder, emptied where it is of other photos.
+    """Create the work folder; a folder of other photos is emptied.
 
-    Raises DatasetError where nobody can say what it is of.
+    Raises DatasetError where the folder's source is unknown.
     """
     remove_leftovers(work)
     note = work / "made_of.json"
     text = json.dumps(record)
     if work.exists():
         if note.is_file():
-            known = read_bytes(note)
-            if known == text.encode():
+            content = read_bytes(note)
+            if content == text.encode():
                 return
-            if not _is_record(known):
+            if not _is_record(content):
                 raise DatasetError(f"folder {work} is in the way, its {note.name} is damaged; move it away")
         elif any(work.iterdir()):
             raise DatasetError(f"folder {work} is in the way and holds something else; move it away")
@@ -80,13 +86,13 @@ def prepare_work(work: Path, record: Mapping[str, Any]) -> None:
 
 
 def _is_record(content: bytes) -> bool:
-    """Whether it is JSON as a record is: its photos are passed by one after another, and never built."""
-    begin = content.find(_PHOTOS) + len(_PHOTOS)
+    """Whether `content` is JSON in the form of a record, found without building the list of its photos."""
+    begin = content.find(_FILES_KEY) + len(_FILES_KEY)
     end = begin
-    if begin >= len(_PHOTOS):
-        while (photo := _PHOTO.match(content, end)) is not None:
+    if begin >= len(_FILES_KEY):
+        while (photo := _PHOTO_ENTRY.match(content, end)) is not None:
             end = photo.end()
-    if len(content) - end + begin > _LONGEST_REST:
+    if len(content) - end + begin > _MAX_REST_BYTES:
         return False
     try:
         return isinstance(json_text.loads(content[:begin] + content[end:]), dict)
@@ -95,7 +101,9 @@ def _is_record(content: bytes) -> bool:
 
 
 def remove_work(work: Path) -> None:
-    """Removes the work folder: hidden first, so that what an end leaves of it is nobody's work."""
+    """Remove the work folder. It is renamed to a hidden name first, so that a partial removal leaves no work
+    folder.
+    """
     hidden = work.with_name(hidden_name(work, "new"))
     try:
         work.rename(hidden)
@@ -105,8 +113,8 @@ def remove_work(work: Path) -> None:
 
 
 @contextlib.contextmanager
-def kept_work(work: Path) -> Iterator[None]:
-    """An error of the system's or of COLMAP's says that the work folder stays, where there is one."""
+def mention_work_folder(work: Path) -> Iterator[None]:
+    """Add to an error of the system or of COLMAP that the work folder stays, where it exists."""
     try:
         yield
     except (OSError, StoppedError) as error:
@@ -119,34 +127,34 @@ def kept_work(work: Path) -> Iterator[None]:
         ) from error
 
 
-def work_photos(
+def prepare_photos(
     source: Path, work: Path, frames: int, on_progress: OnProgress, masks: Path | None = None
 ) -> tuple[list[RawPhoto], dict[str, str]]:
-    """The upright photos in the work folder, and those that cannot be read with the reason.
+    """(write_upright photos in the work folder, reason by name for the photos that cannot be read).
 
-    Masks of them are written there too, upright (see `raw_masks`). Where the list of photos is damaged they
-    are read again; features and matches stay if there are as many.
+    Their masks are written there too, write_upright (see `raw_masks`). Where the list of photos is damaged
+    the photos are read again; features and matches stay if the number of photos is unchanged.
     """
     note = work / "photos.json"
     if note.is_file():
-        known = _known_photos(note, work / "images")
-        if known is not None:
-            return known
+        listed = _read_photo_list(note, work / "images")
+        if listed is not None:
+            return listed
     for name in ("images", VALID_FOLDER):
         shutil.rmtree(work / name, ignore_errors=True)
     if source.is_file():
         base = work / "frames"
         shutil.rmtree(base, ignore_errors=True)
-        files = video_frames(source, frames, base, on_progress)
+        files = extract_video_frames(source, frames, base, on_progress)
     else:
-        base = _base(source)
+        base = _photo_root(source)
         files = find_raw_photos(base)
     photos, unreadable = [], {}
-    valid = RawMasks.of(base, [file.relative_to(base).as_posix() for file in files], masks)
+    valid = RawMasks.find(base, [file.relative_to(base).as_posix() for file in files], masks)
     for index, file in enumerate(files, start=1):
         name = file.relative_to(base).as_posix()
         try:
-            photo = upright(file, name, work / "images")
+            photo = write_upright(file, name, work / "images")
             valid.write(name, file, photo, work / VALID_FOLDER)
             photos.append(photo)
         except DatasetError as error:
@@ -160,42 +168,45 @@ def work_photos(
     return photos, unreadable
 
 
-def _known_photos(note: Path, images: Path) -> tuple[list[RawPhoto], dict[str, str]] | None:
-    """What the list of photos says; None where it is damaged, or a photo is not there."""
+def _read_photo_list(note: Path, images: Path) -> tuple[list[RawPhoto], dict[str, str]] | None:
+    """Content of the list of photos; None where it is damaged, or a photo is missing."""
     try:
-        kept = json_text.loads(read_bytes(note))
-        photos = [RawPhoto(**{**one, "path": images / one["name"]}) for one in kept["photos"]]
-        unreadable = {str(name): str(reason) for name, reason in kept["unreadable"].items()}
-        whole = all(
+        values = json_text.loads(read_bytes(note))
+        photos = [RawPhoto(**{**one, "path": images / one["name"]}) for one in values["photos"]]
+        unreadable = {str(name): str(reason) for name, reason in values["unreadable"].items()}
+        is_complete = all(
             _is_within(photo.name)
             and photo.path.is_file()
-            and all(isinstance(side, int) and 0 < side <= _LONGEST for side in (photo.width, photo.height))
-            and (photo.focal is None or 0.0 < photo.focal <= _LONGEST**2)
+            and all(
+                isinstance(side, int) and 0 < side <= _MAX_SIDE_PIXELS for side in (photo.width, photo.height)
+            )
+            and (photo.focal is None or 0.0 < photo.focal <= _MAX_SIDE_PIXELS**2)
             and isinstance(photo.sharpness, (int, float))
             and isinstance(photo.alpha, bool)
             for photo in photos
         )
     except (OSError, ValueError, TypeError, KeyError, AttributeError):  # OSError: a name that is too long
         return None
-    return (photos, unreadable) if whole else None
+    return (photos, unreadable) if is_complete else None
 
 
 def _is_within(name: str) -> bool:
-    """Whether a photo's name leads nowhere out of the folder of photos."""
+    """Whether a photo's name stays within the folder of photos."""
     parts = PurePosixPath(name).parts
     return bool(parts) and ".." not in parts and not Path(name).is_absolute()
 
 
 def _remove_features(work: Path) -> None:
-    """Removes what was made of a list of photos: their copies for COLMAP, and its database."""
+    """Remove the files derived from a list of photos: their copies for COLMAP, and its database."""
     for file in work.glob(f"{DATABASE}*"):
         file.unlink()
     for name in ("colmap", "masks"):
         shutil.rmtree(work / name, ignore_errors=True)
 
 
-def plainly_named(photos: Sequence[RawPhoto], work: Path) -> list[str]:
-    """Plain names of the photos for COLMAP, in the folder `colmap`; masks in `masks`, of cut-outs too.
+def link_plain_names(photos: Sequence[RawPhoto], work: Path) -> list[str]:
+    """Plain file names of the photos for COLMAP, in the folder `colmap`; their masks, and those of cut-outs,
+    in `masks`.
 
     COLMAP's lists of pairs hold no names with spaces, and it does not read every format.
     """
@@ -224,17 +235,17 @@ def plainly_named(photos: Sequence[RawPhoto], work: Path) -> list[str]:
         if photo.alpha:
             mask = pixels.getchannel("A").point(lambda value: 255 if value > 127 else 0)
             if valid.is_file():
-                with Image.open(valid) as used:
-                    mask = ImageChops.darker(mask, used.convert("L"))
+                with Image.open(valid) as valid_image:
+                    mask = ImageChops.darker(mask, valid_image.convert("L"))
             (work / "masks").mkdir(exist_ok=True)
             mask.save(work / "masks" / f"{name}.png")
-        grey = Image.new("RGBA", pixels.size, (127, 127, 127, 255))
+        gray = Image.new("RGBA", pixels.size, (127, 127, 127, 255))
         with replaced_file(folder / name) as draft:
-            Image.alpha_composite(grey, pixels).convert("RGB").save(draft, compress_level=1)
+            Image.alpha_composite(gray, pixels).convert("RGB").save(draft, compress_level=1)
     return names
 
 
-def record_of(source: Path, frames: int, masks: Path | None = None) -> dict[str, Any]:
+def photo_record(source: Path, frames: int, masks: Path | None = None) -> dict[str, Any]:
     """Record of a set of photos: names, sizes in bytes, times of change; digest of masks."""
     if not source.exists():
         raise DatasetError(f"{source} does not exist; give a folder of photos or a video")
@@ -242,16 +253,22 @@ def record_of(source: Path, frames: int, masks: Path | None = None) -> dict[str,
         raise DatasetError(
             f"{source} is no video that is known by its name; give a folder of photos or an MP4"
         )
-    base = source.parent if source.is_file() else _base(source)
+    base = source.parent if source.is_file() else _photo_root(source)
     files = [source] if source.is_file() else find_raw_photos(base)
     if not files:
         raise DatasetError(f"{base}: no photos in it; give a folder of photos or a video")
     listing = [[f.relative_to(base).as_posix(), f.stat().st_size, f.stat().st_mtime_ns] for f in files]
-    record = {"version": _VERSION, "files": listing, **({"frames": frames} if source.is_file() else {})}
-    digest = RawMasks.of(base, [str(name) for name, *_ in listing], masks, quiet=True).digest()
+    record = {
+        "version": _RECORD_VERSION,
+        "files": listing,
+        **({"frames": frames} if source.is_file() else {}),
+    }
+    digest = RawMasks.find(base, [str(name) for name, *_ in listing], masks, quiet=True).digest()
     return {**record, "masks": digest} if digest else record
 
 
-def _base(source: Path) -> Path:
-    """The folder of the photos: `images` in `source` where there is one, whose neighbours may be masks."""
+def _photo_root(source: Path) -> Path:
+    """Folder of the photos: `images` in `source` where it exists, since its neighbors may be masks, else
+    `source`.
+    """
     return source / "images" if (source / "images").is_dir() else source

@@ -1,7 +1,7 @@
-"""The points that a training starts from: a data set's own, triangulated ones, or random ones.
+"""Sparse points that a training starts from: the data set's own, triangulated, or random points.
 
-A point that held-out photos alone see would let a training peek at them: `training_points` leaves it out, and
-points that are triangulated for a training come from its training photos alone.
+A point that held-out photos alone see would leak test data into a training: `training_points` leaves it out,
+and points that are triangulated for a training come from its training photos alone.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from cagefield.files.user_cache import cache_root
 FloatArray = npt.NDArray[np.float64]
 Views = Literal["train", "all"]
 
-LEAST = 50
-"""Fewer points than these are none."""
+MIN_STARTING_POINTS = 50
+"""Minimum number of points; fewer are discarded."""
 
-_VERSION = b"points 1"  # of the files; changes with what `triangulate` finds
-_SAMPLE = 1 << 16  # bytes hashed at the beginning and at the end of each photo
-_PHOTOS = 64  # whose pixels colour random points, at most
-_LEAST_OPAQUE = 128  # alpha below which a pixel of a cut-out shows no surface
-_FARTHEST = 20.0  # half-sizes of the cube of interest to the farthest random point
-_ROUNDS = 12
-_MOST_TRIED = 200_000  # random points in one round
-_PATIENCE = 4  # rounds of random points after which the halves may differ
+_CACHE_VERSION = b"points 1"  # of the files; changes with the results of `triangulate`
+_SAMPLE_BYTES = 1 << 16  # bytes hashed at the beginning and at the end of each photo
+_MAX_COLOR_PHOTOS = 64  # whose pixels color random points, at most
+_MIN_OPAQUE_ALPHA = 128  # alpha below which a pixel of a cut-out shows no surface
+_MAX_DISTANCE_HALF_SIZES = 20.0  # half-sizes of the cube of interest to the farthest random point
+_MAX_ROUNDS = 12
+_MAX_CANDIDATES = 200_000  # random points in one round
+_BALANCED_ROUNDS = 4  # rounds of random points after which the halves may differ
 
 
-def points_of(
+def starting_points(
     dataset: Dataset,
     cache: Path | None = None,
     *,
@@ -51,16 +51,16 @@ def points_of(
     on_progress: OnProgress | None = None,
     seed: int = 0,
 ) -> SparsePoints | None:
-    """The data set's points, else points triangulated from its poses; None, after one warning, without any.
+    """Data set's points, else points triangulated from its poses; None, after one warning, without any.
 
     `views` "train" takes no point that held-out photos alone see, and triangulates training photos alone;
-    "all" is for measuring. Triangulated points are kept in the folder `cache` under a name that changes with
-    photos, poses and seed, and read from there again; for None they are made each time.
+    "all" is for measuring. Triangulated points are stored in the folder `cache` under a name that depends on
+    photos, poses and seed, and read from there again; for None they are triangulated each time.
     """
     known = training_points(dataset) if views == "train" else dataset.points
-    if known is not None and len(known) >= LEAST:
+    if known is not None and len(known) >= MIN_STARTING_POINTS:
         return known
-    used = dataset.train if views == "train" else (*dataset.train, *dataset.test, *_further(dataset))
+    used = dataset.train if views == "train" else (*dataset.train, *dataset.test, *_validation_views(dataset))
     file = None if cache is None else cache / f"points-{capture_key(used, seed)}.npz"
     found = None if file is None else read_cached_points(file)
     if found is None:
@@ -71,7 +71,7 @@ def points_of(
             return None
         if file is not None and found is not None:
             write_cached_points(file, found)
-    if found is None or len(found) < LEAST:
+    if found is None or len(found) < MIN_STARTING_POINTS:
         count = 0 if found is None else len(found)
         warnings.warn(
             f"{dataset.path}: the photos give {count} points, too few to start from; poses may be wrong, or "
@@ -83,7 +83,9 @@ def points_of(
 
 
 def training_points(dataset: Dataset) -> SparsePoints | None:
-    """The data set's points that at least two training views see, or all where nobody says who sees them."""
+    """Data set's points that at least two training views see, or all points where observations are
+    unknown.
+    """
     points = dataset.points
     if points is None or not points.seen_by:
         return points
@@ -92,46 +94,50 @@ def training_points(dataset: Dataset) -> SparsePoints | None:
 
 
 def random_points(dataset: Dataset, count: int, seed: int = 0) -> SparsePoints:
-    """`count` random positions that training views see, with the mean colour of the pixels there.
+    """`count` random positions that training views see, with the mean color of the pixels there.
 
     Bounded: uniform in the bounds, and for cut-outs nowhere that a photo shows as empty. Unbounded: half of
     them uniform in the cube of interest, half around it, uniform in direction and in 1/distance from the
     cube's faces to 20 times as far. Two views see each of them where the capture has such places, else one.
-    There may be fewer than `count`, where the views see little of that.
+    The result has fewer than `count` points where the views see little of these regions.
     """
     if count < 1:
         raise DatasetError(f"count must be at least 1, got {count}")
     rng = np.random.default_rng(seed)
-    photos = _Photos(dataset)
-    kept: list[FloatArray] = []
-    colours: list[FloatArray] = []
-    tried, within, total, least = 0, 0, 0, min(2, len(dataset.train))
-    for attempt in range(_ROUNDS):
-        yielded = max(total / tried, 1e-3) if tried else 0.5
-        candidates = _candidates(dataset, min(max(int(1.3 * count / yielded), 1000), _MOST_TRIED), rng)
-        tried += len(candidates)
-        seen, rgb = photos.look(candidates)
-        good = seen >= least
-        if least > 1 and not good.any() and attempt == 0:
-            least, good = 1, seen >= 1
-        kept.append(candidates[good])
-        colours.append(rgb[good])
-        inside = int(np.count_nonzero(_inside(dataset, candidates[good])))
-        within, total = within + inside, total + int(np.count_nonzero(good))
-        even = not dataset.unbounded or min(within, total - within) >= (count + 1) // 2
-        if total >= count and (even or attempt + 1 >= _PATIENCE):
+    photos = _TrainingPhotos(dataset)
+    accepted: list[FloatArray] = []
+    colors: list[FloatArray] = []
+    tried_count, inside_count, accepted_count, min_views = 0, 0, 0, min(2, len(dataset.train))
+    for attempt in range(_MAX_ROUNDS):
+        acceptance = max(accepted_count / tried_count, 1e-3) if tried_count else 0.5
+        candidates = _candidates(dataset, min(max(int(1.3 * count / acceptance), 1000), _MAX_CANDIDATES), rng)
+        tried_count += len(candidates)
+        seen, rgb = photos.count_views(candidates)
+        is_seen = seen >= min_views
+        if min_views > 1 and not is_seen.any() and attempt == 0:
+            min_views, is_seen = 1, seen >= 1
+        accepted.append(candidates[is_seen])
+        colors.append(rgb[is_seen])
+        inside = int(np.count_nonzero(_inside(dataset, candidates[is_seen])))
+        inside_count, accepted_count = inside_count + inside, accepted_count + int(np.count_nonzero(is_seen))
+        is_balanced = (
+            not dataset.unbounded or min(inside_count, accepted_count - inside_count) >= (count + 1) // 2
+        )
+        if accepted_count >= count and (is_balanced or attempt + 1 >= _BALANCED_ROUNDS):
             break
-    if not total:
+    if not accepted_count:
         raise DatasetError(f"{dataset.path}: no camera sees the scene's bounds; check poses and bounds")
-    positions, rgb = np.concatenate(kept), np.concatenate(colours)
+    positions, rgb = np.concatenate(accepted), np.concatenate(colors)
     chosen = (
-        _half_each(_inside(dataset, positions), count) if dataset.unbounded else np.arange(min(count, total))
+        _balanced_rows(_inside(dataset, positions), count)
+        if dataset.unbounded
+        else np.arange(min(count, accepted_count))
     )
     return SparsePoints(positions[chosen], np.rint(rgb[chosen]).astype(np.uint8))
 
 
-def points_cache() -> Path:
-    """The folder of triangulated points in the user's cache."""
+def points_cache_folder() -> Path:
+    """Folder of triangulated points in the user's cache."""
     return cache_root() / "points"
 
 
@@ -140,11 +146,13 @@ def _inside(dataset: Dataset, positions: FloatArray) -> npt.NDArray[np.bool_]:
     return np.asarray(np.all((positions >= low) & (positions <= high), axis=1))
 
 
-def _half_each(inside: npt.NDArray[np.bool_], count: int) -> npt.NDArray[np.intp]:
-    """Rows: half of `count` inside and half outside, or more of one kind where the other has too few."""
-    within, without = np.flatnonzero(inside), np.flatnonzero(~inside)
-    first = min(len(within), max(count // 2, count - len(without)))
-    return np.concatenate([within[:first], without[: count - first]])
+def _balanced_rows(inside: npt.NDArray[np.bool_], count: int) -> npt.NDArray[np.intp]:
+    """Rows of `count` points: half inside and half outside, or more of one kind where the other has
+    too few.
+    """
+    inside_rows, outside_rows = np.flatnonzero(inside), np.flatnonzero(~inside)
+    first = min(len(inside_rows), max(count // 2, count - len(outside_rows)))
+    return np.concatenate([inside_rows[:first], outside_rows[: count - first]])
 
 
 def _candidates(dataset: Dataset, count: int, rng: np.random.Generator) -> FloatArray:
@@ -154,22 +162,26 @@ def _candidates(dataset: Dataset, count: int, rng: np.random.Generator) -> Float
     half = count // 2
     directions = rng.standard_normal((count - half, 3))
     directions /= np.abs(directions).max(axis=1, keepdims=True)  # to the faces of the cube [-1, 1]^3
-    far = directions / rng.uniform(1.0 / _FARTHEST, 1.0, (count - half, 1))
-    return np.concatenate([rng.uniform(low, high, (half, 3)), 0.5 * (low + high) + 0.5 * (high - low) * far])
+    distant = directions / rng.uniform(1.0 / _MAX_DISTANCE_HALF_SIZES, 1.0, (count - half, 1))
+    return np.concatenate(
+        [rng.uniform(low, high, (half, 3)), 0.5 * (low + high) + 0.5 * (high - low) * distant]
+    )
 
 
-class _Photos:
-    """The pixels of some training photos, evenly among all."""
+class _TrainingPhotos:
+    """Pixels of some training photos, evenly among all."""
 
     def __init__(self, dataset: Dataset) -> None:
-        step = max(1, -(-len(dataset.train) // _PHOTOS))
+        step = max(1, -(-len(dataset.train) // _MAX_COLOR_PHOTOS))
         self._views = [(view.camera, view.load(), view.valid_pixels()) for view in dataset.train[::step]]
 
-    def look(self, points: FloatArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
-        """How many photos see each point, 0 where one shows it as empty, and their mean colour [N,3]."""
+    def count_views(self, points: FloatArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
+        """(number [N] of photos that see each point, 0 where one shows it as empty; mean color [N,3] in
+        them).
+        """
         seen = np.zeros(len(points), dtype=np.intp)
         empty = np.zeros(len(points), dtype=bool)
-        summed = np.zeros((len(points), 3))
+        color_sums = np.zeros((len(points), 3))
         for camera, pixels, valid in self._views:
             positions, depth = camera.project(points)
             with np.errstate(invalid="ignore"):
@@ -182,20 +194,20 @@ class _Photos:
                 rows, columns, lines = rows[usable], columns[usable], lines[usable]
             found = pixels[lines, columns]
             if found.shape[1] == 4:
-                empty[rows] |= found[:, 3] < _LEAST_OPAQUE
+                empty[rows] |= found[:, 3] < _MIN_OPAQUE_ALPHA
             seen[rows] += 1
-            summed[rows] += found[:, :3]
-        return np.where(empty, 0, seen), summed / np.maximum(seen, 1)[:, None]
+            color_sums[rows] += found[:, :3]
+        return np.where(empty, 0, seen), color_sums / np.maximum(seen, 1)[:, None]
 
 
-def _further(dataset: Dataset) -> tuple[View, ...]:
+def _validation_views(dataset: Dataset) -> tuple[View, ...]:
     """Validation views that are not test views too."""
     known = {view.image_path for view in (*dataset.train, *dataset.test)}
     return tuple(view for view in dataset.val if view.image_path not in known)
 
 
-def capture_key(views: Sequence[View], seed: int, version: bytes = _VERSION) -> str:
-    """Digest of photos, names, poses, lenses and seed."""
+def capture_key(views: Sequence[View], seed: int, version: bytes = _CACHE_VERSION) -> str:
+    """Digest of photos, names, poses, lenses and seed, as 24 hexadecimal digits."""
     digest = hashlib.sha256(version + str(seed).encode())
     for view in views:
         header = read_header(view.image_path)
@@ -203,15 +215,15 @@ def capture_key(views: Sequence[View], seed: int, version: bytes = _VERSION) -> 
         digest.update(camera.encode())
         for file in (view.image_path, *(() if view.mask is None else (view.mask.path,))):
             with open_regular(file) as stream:
-                digest.update(stream.read(_SAMPLE))
+                digest.update(stream.read(_SAMPLE_BYTES))
                 size = stream.seek(0, os.SEEK_END)
-                stream.seek(max(0, size - _SAMPLE))
-                digest.update(stream.read(_SAMPLE) + str(size).encode())
+                stream.seek(max(0, size - _SAMPLE_BYTES))
+                digest.update(stream.read(_SAMPLE_BYTES) + str(size).encode())
     return digest.hexdigest()[:24]
 
 
 def write_cached_points(file: Path, points: SparsePoints) -> None:
-    """Writes the file whole or not at all; where the folder cannot be written to, nothing."""
+    """Write the file whole or not at all; an unwritable folder is ignored."""
     names = sorted({name for seen in points.seen_by for name in seen})
     numbers = {name: number for number, name in enumerate(names)}
     flat = [sorted(numbers[name] for name in seen) for seen in points.seen_by]
@@ -232,7 +244,7 @@ def write_cached_points(file: Path, points: SparsePoints) -> None:
 
 
 def read_cached_points(file: Path) -> SparsePoints | None:
-    """The points of a file; None where it is not there or damaged."""
+    """Points of a file; None where it is missing or damaged."""
     try:
         arrays = read_arrays(file)
         names, counts, numbers = (arrays[name] for name in ("names", "counts", "seen"))

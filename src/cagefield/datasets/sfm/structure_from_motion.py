@@ -1,10 +1,10 @@
-"""A data set of photos alone, or of a video: COLMAP's structure from motion, by pycolmap, on the CPU.
+"""Posed data set of photos alone, or of a video: COLMAP's structure from motion, by pycolmap, on the CPU.
 
-The result is a folder in COLMAP's layout, which `load_dataset` reads: `images`, the photos that found their
-place, turned upright, and their `masks`; `sparse/0`, the model; `poses.json`, what it was made of, and why
-photos were left out.
+The result is a folder in COLMAP's layout, which `load_dataset` reads: `images`, the registered photos, turned
+write_upright, and their `masks`; `sparse/0`, the model; `poses.json`, the record of the source and the
+reasons why photos were left out.
 
-Everything on the way is in a work folder beside it (`NAME.work`: photos, and the database of features and
+Intermediate files are in a work folder beside it (`NAME.work`: photos, and the database of features and
 matches), from which an interrupted run continues; it is removed at the end.
 """
 
@@ -20,61 +20,68 @@ from pathlib import Path
 from typing import Any
 
 from cagefield.cameras.camera import Camera
-from cagefield.datasets.colmap.colmap_files import check_whole
+from cagefield.datasets.colmap.colmap_files import check_complete
 from cagefield.datasets.colmap.colmap_lenses import lens_views
-from cagefield.datasets.colmap.colmap_model import pose_of
+from cagefield.datasets.colmap.colmap_model import image_pose
 from cagefield.datasets.raw_photos import RawPhoto
 from cagefield.datasets.sfm import disambiguation, features, moving_features
 from cagefield.datasets.sfm.database_check import check_database, recorded_digest
 from cagefield.datasets.sfm.features import OnProgress, Photo
 from cagefield.datasets.sfm.matching import match
 from cagefield.datasets.sfm.raw_masks import VALID_FOLDER
-from cagefield.datasets.sfm.registration_report import Matches, reasons_left_out, verified_matches, why_none
+from cagefield.datasets.sfm.registration_report import (
+    Matches,
+    explain_no_model,
+    explain_unregistered,
+    verified_matches,
+)
 from cagefield.datasets.sfm.sfm_workspace import (
     DATABASE,
-    kept_work,
-    plainly_named,
+    link_plain_names,
+    mention_work_folder,
+    photo_record,
+    prepare_photos,
     prepare_work,
-    record_of,
     remove_work,
     work_folder,
-    work_photos,
 )
-from cagefield.datasets.sfm.transforms_writer import FILES, RECORD
+from cagefield.datasets.sfm.transforms_writer import RECORD_FILE, WRITTEN_FILES
 from cagefield.errors import DatasetError
 from cagefield.files import json_text
 from cagefield.files.atomic import recover_folder, replaced_folder
 from cagefield.files.safe_open import read_text
 
-MOST_FOR_ALL_PAIRS = 120
-"""Photos of which every pair is matched; of more, those that are near in order or look alike."""
+MAX_EXHAUSTIVE_PHOTOS = 120
+"""Maximum number of photos of which every pair is matched; of more, pairs near in order or similar in
+features.
+"""
 
-LONGER_SIDE = 1600
-"""Photos are shrunk to this many pixels for features."""
+FEATURE_SIDE_PIXELS = 1600
+"""Longer side to which photos are shrunk for feature extraction."""
 
 MIN_STATIC_POINTS, MIN_STATIC_SHARE = 12, 0.15
 """Points that place a photo, number and share, at least, where only those that stand still are left."""
 
-LEAST_SHARED = 12
+MIN_RADIAL_PHOTOS = 12
 """Photos that share a camera, from which on its lens has a second radial term: RADIAL, not SIMPLE_RADIAL.
 
 Both have square pixels: cameras that are held level do not tell their aspect from a stretched scene."""
 
-_FOCAL_GUESS = 1.2  # focal length over the longer side, where the camera wrote none
+_GUESSED_FOCAL_SIDES = 1.2  # focal length over the longer side, where the camera wrote none
 
 
 @dataclass(frozen=True)
 class PosesReport:
-    """What became of the photos.
+    """Numbers of registered photos and points, and the reasons for photos that were left out.
 
     Attributes:
         folder: the data set.
-        total: photos that there were, readable or not.
-        placed: photos that found their place.
-        points: sparse points.
+        total: number of photos, readable or not.
+        placed: number of registered photos.
+        points: number of sparse points.
         error: mean reprojection error in pixels.
-        left_out: the other photos, and what was wrong with each.
-        moving: photos whose features on things that move were left out.
+        left_out: reason, by name, for the other photos.
+        moving: number of photos whose features on moving things were left out.
     """
 
     folder: Path
@@ -95,30 +102,30 @@ def make_poses(
     seed: int = 0,
     on_progress: OnProgress | None = None,
 ) -> PosesReport:
-    """Writes the data set `target` of a folder of photos or a video; replaces what is there.
+    """Write the data set `target` of a folder of photos or a video, replacing an earlier one.
 
     An interrupted run of the same photos continues from its work folder. `frames` are taken of a video.
-    Where masks exclude (those of the folder `masks`, else those beside the photos) there are no features; the
-    data set has them too.
+    Features are not taken where masks exclude pixels (masks of the folder `masks`, else files beside the
+    photos); the data set has the masks too.
 
-    Raises DatasetError where pycolmap is missing, where fewer than three photos find their place, and where
-    the disk is full: `target` is what it was, and the work folder stays.
+    Raises DatasetError where pycolmap is missing, where fewer than three photos are registered, and where the
+    disk is full: `target` is then unchanged, and the work folder stays.
     """
     features.engine()
-    record = record_of(source, frames, masks)
-    recover_folder(target, lambda folder: (folder / RECORD).is_file())
+    record = photo_record(source, frames, masks)
+    recover_folder(target, lambda folder: (folder / RECORD_FILE).is_file())
     work = work_folder(target)
-    with kept_work(work):
+    with mention_work_folder(work):
         prepare_work(work, record)
         check_database(work / DATABASE)
         with recorded_digest(work / DATABASE):
-            report = _made(source, target, record, frames, masks, seed, on_progress)
+            report = _build(source, target, record, frames, masks, seed, on_progress)
     remove_work(work)
     features.share(on_progress, 0.0, 1.0)(1.0, f"{report.placed} of {report.total} photos")
     return report
 
 
-def _made(
+def _build(
     source: Path,
     target: Path,
     record: Mapping[str, Any],
@@ -128,15 +135,15 @@ def _made(
     on_progress: OnProgress | None,
 ) -> PosesReport:
     work = work_folder(target)
-    photos, unreadable = work_photos(source, work, frames, features.share(on_progress, 0.0, 0.1), masks)
+    photos, unreadable = prepare_photos(source, work, frames, features.share(on_progress, 0.0, 0.1), masks)
     total = len(photos) + len(unreadable)
     if len(photos) < 3:
         reasons = "".join(f"; {name}: {reason}" for name, reason in list(unreadable.items())[:3])
         raise DatasetError(f"{source}: {len(photos)} photos can be read, at least 3 are needed{reasons}")
-    names = plainly_named(photos, work)
+    names = link_plain_names(photos, work)
     database = work / DATABASE
     if not database.is_file():
-        cameras, shared = camera_guesses(photos)
+        cameras, shared = guess_cameras(photos)
         listed = [Photo(n, c) for n, c in zip(names, shared, strict=True)]
         features.create_database(database, cameras, listed)
     plain_masks = work / "masks"
@@ -145,23 +152,27 @@ def _made(
         work / "colmap",
         names,
         features=8192 if len(photos) <= 60 else 4096,
-        longer_side=LONGER_SIDE,
+        longer_side=FEATURE_SIDE_PIXELS,
         masks=plain_masks if plain_masks.is_dir() else None,
         on_progress=features.share(on_progress, 0.1, 0.3),
     )
-    few = len(photos) <= MOST_FOR_ALL_PAIRS
-    pairs = features.all_pairs(len(photos)) if few else features.likely_pairs(database, len(photos))
+    uses_all_pairs = len(photos) <= MAX_EXHAUSTIVE_PHOTOS
+    pairs = (
+        features.all_pairs(len(photos))
+        if uses_all_pairs
+        else features.select_likely_pairs(database, len(photos))
+    )
     match(database, names, pairs, verify=True, seed=seed, on_progress=features.share(on_progress, 0.3, 0.7))
     shared_matches = verified_matches(database, len(photos))
     found = reconstruct(work, names, shared_matches, seed, features.share(on_progress, 0.7, 0.99))
     models = found.models
     if not models:
-        raise DatasetError(f"{source}: {why_none(photos, shared_matches)}")
+        raise DatasetError(f"{source}: {explain_no_model(photos, shared_matches)}")
     model = models[0]
     placed = {image_id - 1 for image_id in model.reg_image_ids()}
-    left_out = unreadable | reasons_left_out(photos, placed, models[1:], shared_matches)
+    left_out = unreadable | explain_unregistered(photos, placed, models[1:], shared_matches)
     if len(placed) < 3:
-        raise DatasetError(f"{source}: {why_none(photos, shared_matches)}")
+        raise DatasetError(f"{source}: {explain_no_model(photos, shared_matches)}")
     report = PosesReport(
         target,
         total,
@@ -175,23 +186,23 @@ def _made(
     return report
 
 
-def is_made_of(target: Path, source: Path, frames: int = 80, masks: Path | None = None) -> bool:
-    """Whether the data set `target` was made of these photos, none of them changed since."""
+def is_built_from(target: Path, source: Path, frames: int = 80, masks: Path | None = None) -> bool:
+    """Whether the data set `target` was built from these photos, unchanged since."""
     try:
-        known = json_text.loads(read_text(target / RECORD))
+        known = json_text.loads(read_text(target / RECORD_FILE))
     except (OSError, ValueError):
         return False
-    return isinstance(known, dict) and known.get("made_of") == record_of(source, frames, masks)
+    return isinstance(known, dict) and known.get("made_of") == photo_record(source, frames, masks)
 
 
-def camera_guesses(photos: Sequence[RawPhoto]) -> tuple[list[Any], list[int]]:
-    """COLMAP's first guesses of the cameras, and each photo's: one for all of one size and focal length."""
+def guess_cameras(photos: Sequence[RawPhoto]) -> tuple[list[Any], list[int]]:
+    """(COLMAP's initial cameras, number of each photo's): one for all photos of one size and focal length."""
     pycolmap = features.engine()
-    groups, numbers = features.consecutive((p.width, p.height, p.focal) for p in photos)
+    groups, numbers = features.number_groups((p.width, p.height, p.focal) for p in photos)
     cameras = []
     for index, (width, height, focal) in enumerate(groups):
-        model = "RADIAL" if numbers.count(index) >= LEAST_SHARED else "SIMPLE_RADIAL"
-        guess = _FOCAL_GUESS * max(width, height) if focal is None else focal
+        model = "RADIAL" if numbers.count(index) >= MIN_RADIAL_PHOTOS else "SIMPLE_RADIAL"
+        guess = _GUESSED_FOCAL_SIDES * max(width, height) if focal is None else focal
         camera = pycolmap.Camera.create_from_model_name(index + 1, model, guess, width, height)
         camera.has_prior_focal_length = focal is not None
         cameras.append(camera)
@@ -214,19 +225,19 @@ class Reconstructions:
 def reconstruct(
     work: Path, names: Sequence[str], matches: Matches, seed: int, on_progress: OnProgress
 ) -> Reconstructions:
-    """Reconstructions from the verified matches in `work`, without folds and without things that move.
+    """Reconstructions from the verified matches in `work`, without folds and without moving things.
 
-    Where photos show things that move, those without their features are taken if they place as many photos
-    and the matches that are left agree with them better.
+    Where photos show things that move, a reconstruction without their features is preferred if it registers
+    as many photos and the remaining matches agree with it better.
     """
     mapping = features.share(on_progress, 0.0, 0.7)
-    models, database = unfolded_models(work, matches, seed, mapping)
+    models, database = build_unambiguous_models(work, matches, seed, mapping)
     if not models:
         return Reconstructions(models)
     matched = moving_features.read_features(database, len(names))
     before = _cameras(models[0])
     moving, photos = moving_features.moving_features(matched, before)
-    if len(photos) < moving_features.MIN_PHOTOS:
+    if len(photos) < moving_features.MIN_MOVING_PHOTOS:
         return Reconstructions(models)
     copy = work / "static_features.db"
     shutil.copyfile(database, copy)
@@ -236,8 +247,8 @@ def reconstruct(
     static = _map(work, copy, len(names), seed, features.share(on_progress, 0.8, 1.0), few_matches=True)
     if not static or static[0].num_reg_images() < models[0].num_reg_images():
         return Reconstructions(models)
-    left = moving_features.read_features(copy, len(names))
-    errors = [moving_features.capped_error(left, each) for each in (before, _cameras(static[0]))]
+    remaining = moving_features.read_features(copy, len(names))
+    errors = [moving_features.capped_error(remaining, each) for each in (before, _cameras(static[0]))]
     return Reconstructions(static, tuple(photos)) if errors[1] < errors[0] else Reconstructions(models)
 
 
@@ -247,44 +258,55 @@ def _cameras(model: Any) -> dict[int, Camera]:
 
 
 def model_camera(model: Any, image: Any) -> Camera:
-    """The camera of an image of a reconstruction, in its world."""
-    made = model.camera(image.camera_id)
-    lens = lens_views(made.model.name, tuple(made.params.tolist()), made.width, made.height)[0]
-    return lens.camera.with_c2w(pose_of(image))
+    """Camera of an image of a reconstruction, in the reconstruction's world."""
+    colmap_camera = model.camera(image.camera_id)
+    lens = lens_views(
+        colmap_camera.model.name,
+        tuple(colmap_camera.params.tolist()),
+        colmap_camera.width,
+        colmap_camera.height,
+    )[0]
+    return lens.camera.with_c2w(image_pose(image))
 
 
-def unfolded_models(
+def build_unambiguous_models(
     work: Path, matches: Matches, seed: int, on_progress: OnProgress
 ) -> tuple[list[Any], Path]:
     """(reconstructions without pairs that only look alike, the most photos first; database of their pairs).
 
-    Photos in order are placed by their neighbours alone first; where that contradicts pairs further apart,
-    these are left out, unless fewer photos, or with as many fewer points, come of it.
+    Photos in order are registered by their neighbors alone first; pairs further apart that contradict this
+    chain are left out, unless the result has fewer photos, or as many photos and fewer points.
     """
     count, database = len(matches.counts), work / DATABASE
-    if not disambiguation.are_in_order(matches.counts):
+    if not disambiguation.is_sequence(matches.counts):
         return _map(work, database, count, seed, on_progress), database
-    far = disambiguation.far_pairs(matches.counts)
-    chain = _map(work, without_pairs(database, far), count, seed, features.share(on_progress, 0.0, 0.33))
-    false: set[tuple[int, int]] = set()
+    distant = disambiguation.distant_pairs(matches.counts)
+    chain = _map(
+        work, copy_without_pairs(database, distant), count, seed, features.share(on_progress, 0.0, 0.33)
+    )
+    false_pairs: set[tuple[int, int]] = set()
     if chain:
-        relative = disambiguation.relative_rotations(database, chain[0], far)
-        false = disambiguation.contradicting(disambiguation.rotations_of(chain[0]), relative)
-    plain = _map(work, database, count, seed, features.share(on_progress, 0.33, 0.66))
-    if not false:
-        return plain, database
-    fewer = without_pairs(database, false)
-    pruned = _map(work, fewer, count, seed, features.share(on_progress, 0.66, 1.0))
-    return (pruned, fewer) if _size(pruned) >= _size(plain) else (plain, database)
+        relative = disambiguation.relative_rotations(database, chain[0], distant)
+        false_pairs = disambiguation.contradicting_pairs(disambiguation.model_rotations(chain[0]), relative)
+    plain_models = _map(work, database, count, seed, features.share(on_progress, 0.33, 0.66))
+    if not false_pairs:
+        return plain_models, database
+    pruned_database = copy_without_pairs(database, false_pairs)
+    pruned_models = _map(work, pruned_database, count, seed, features.share(on_progress, 0.66, 1.0))
+    return (
+        (pruned_models, pruned_database)
+        if _size(pruned_models) >= _size(plain_models)
+        else (plain_models, database)
+    )
 
 
 def _size(models: Sequence[Any]) -> tuple[int, int]:
-    """Photos, then points, of the first of the reconstructions."""
+    """(number of photos, number of points) of the first of the reconstructions."""
     return (models[0].num_reg_images(), models[0].num_points3D()) if models else (0, 0)
 
 
-def without_pairs(database: Path, pairs: set[tuple[int, int]]) -> Path:
-    """A copy of the database without the verified matches of these pairs."""
+def copy_without_pairs(database: Path, pairs: set[tuple[int, int]]) -> Path:
+    """Copy of the database without the verified matches of these pairs."""
     copy = database.with_name("fewer_pairs.db")
     shutil.copyfile(database, copy)
     disambiguation.remove_pairs(copy, pairs)
@@ -294,13 +316,15 @@ def without_pairs(database: Path, pairs: set[tuple[int, int]]) -> Path:
 def _map(
     work: Path, database: Path, count: int, seed: int, on_progress: OnProgress, few_matches: bool = False
 ) -> list[Any]:
-    """The reconstructions, the one with the most photos first; `few_matches` are enough for a photo."""
+    """Reconstructions, the one with the most photos first; `few_matches` lowers the number needed to register
+    a photo.
+    """
     pycolmap = features.engine()
     options = pycolmap.IncrementalPipelineOptions(min_model_size=3, random_seed=seed, max_num_models=10)
     options.mapper.random_seed = seed
     options.triangulation.random_seed = seed
     if few_matches:
-        options.min_num_matches = moving_features.MIN_MATCHES
+        options.min_num_matches = moving_features.MIN_STATIC_MATCHES
         options.mapper.abs_pose_min_num_inliers = MIN_STATIC_POINTS
         options.mapper.abs_pose_min_inlier_ratio = MIN_STATIC_SHARE
     out = work / "models"
@@ -308,7 +332,7 @@ def _map(
     out.mkdir()
     placed = [0]
 
-    def one_more() -> None:
+    def count_photo() -> None:
         placed[0] += 1
 
     def start() -> None:
@@ -325,7 +349,7 @@ def _map(
         out,
         options=options,
         initial_image_pair_callback=start,
-        next_image_callback=one_more,
+        next_image_callback=count_photo,
         poll=poll,
     )
     return sorted(found.values(), key=lambda m: (-m.num_reg_images(), -m.num_points3D()))
@@ -339,12 +363,12 @@ def _write(
     record: Mapping[str, Any],
     report: PosesReport,
 ) -> None:
-    """The data set, whole or not at all."""
+    """Write the data set, whole or not at all."""
     for index in placed:
         model.image(index + 1).name = photos[index].name
     for image_id in [number for number in model.images if number - 1 not in placed]:
         del model.images[image_id]
-    with replaced_folder(target, FILES) as draft:
+    with replaced_folder(target, WRITTEN_FILES) as draft:
         for index in sorted(placed):
             photo = photos[index]
             _link(photo.path, draft / "images" / photo.name)
@@ -361,23 +385,23 @@ def _write(
             "reprojection_error": round(report.error, 4),
             "left_out": dict(report.left_out),
         }
-        (draft / RECORD).write_text(json.dumps(summary, indent=1), encoding="utf-8")
+        (draft / RECORD_FILE).write_text(json.dumps(summary, indent=1), encoding="utf-8")
 
 
-def _link(file: Path, place: Path) -> None:
-    """Puts a file at another place too."""
-    place.parent.mkdir(parents=True, exist_ok=True)
+def _link(file: Path, target: Path) -> None:
+    """Hard-link a file to another path, or copy it where links fail."""
+    target.parent.mkdir(parents=True, exist_ok=True)
     try:
-        os.link(file, place)
+        os.link(file, target)
     except OSError:
-        shutil.copy2(file, place)
+        shutil.copy2(file, target)
 
 
 def _write_model(model: Any, folder: Path) -> None:
-    """Writes the files of a model. Raises OSError where they are cut off: COLMAP does not notice."""
+    """Write the files of a model. Raises OSError where they are truncated: COLMAP does not notice."""
     with features.quiet():
         model.write_binary(folder)
     try:
-        check_whole(folder)
+        check_complete(folder)
     except DatasetError as error:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from error

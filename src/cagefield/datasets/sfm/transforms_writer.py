@@ -1,10 +1,10 @@
-"""Data sets written as nerfstudio's transforms.json, in the world that they have.
+"""Writer of data sets as nerfstudio's transforms.json, in their own world.
 
-images/...        the photos, as they are; resampled ones as PNG
+images/...        the photos, linked or copied; resampled photos as PNG
 masks/...         black where pixels are excluded, for photos with a mask
 sparse_pc.ply     the sparse points
 transforms.json   intrinsics of each frame, OpenGL camera-to-world poses, `applied_transform`, the splits
-poses.json        the record of a data set that `cagefield poses` wrote, which alone may be replaced
+poses.json        the record of a data set written by `cagefield poses`, which alone may be replaced
 """
 
 from __future__ import annotations
@@ -22,25 +22,25 @@ from cagefield.datasets.sfm.features import OnProgress
 from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.files.atomic import recover_folder, replaced_folder
 
-FILE = "transforms.json"
+TRANSFORMS_FILE = "transforms.json"
 
-RECORD = "poses.json"
+RECORD_FILE = "poses.json"
 
-FILES = ("images", "masks", "sparse", "sparse_pc.ply", FILE, RECORD)
+WRITTEN_FILES = ("images", "masks", "sparse", "sparse_pc.ply", TRANSFORMS_FILE, RECORD_FILE)
 """Files and folders that `cagefield poses` writes, with a COLMAP model or with transforms.json."""
 
 
 def write_transforms(dataset: Dataset, target: Path, on_progress: OnProgress | None = None) -> None:
-    """Writes all views of the data set, at the size at which they were opened, to the folder `target`.
+    """Write all views of the data set, at the size at which they were opened, to the folder `target`.
 
     The folder appears whole or not at all; files of another program in it stay.
 
     Raises DatasetError where a photo cannot be read, OSError where the folder cannot be written.
     """
-    recover_folder(target, lambda folder: (folder / RECORD).is_file())
+    recover_folder(target, lambda folder: (folder / RECORD_FILE).is_file())
     splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
     views = {view.name: view for split in splits.values() for view in split}
-    with replaced_folder(target, FILES) as draft:
+    with replaced_folder(target, WRITTEN_FILES) as draft:
         frames, paths = [], {}
         for number, name in enumerate(sorted(views), start=1):
             paths[name] = _write_photo(views[name], draft)
@@ -52,18 +52,18 @@ def write_transforms(dataset: Dataset, target: Path, on_progress: OnProgress | N
             "applied_transform": dataset.source_to_world[:3].tolist(),
             "frames": frames,
         }
-        for split, own in splits.items():
-            if own and len(own) < len(views):
-                values[f"{split}_filenames"] = [paths[view.name] for view in own]
+        for split, view_group in splits.items():
+            if view_group and len(view_group) < len(views):
+                values[f"{split}_filenames"] = [paths[view.name] for view in view_group]
         if dataset.points is not None:
             values["ply_file_path"] = "sparse_pc.ply"
             _write_points(dataset.points, draft / "sparse_pc.ply")
-        (draft / FILE).write_text(json.dumps(values, indent=1), encoding="utf-8")
-        (draft / RECORD).write_text(json.dumps({"photos": len(views)}, indent=1), encoding="utf-8")
+        (draft / TRANSFORMS_FILE).write_text(json.dumps(values, indent=1), encoding="utf-8")
+        (draft / RECORD_FILE).write_text(json.dumps({"photos": len(views)}, indent=1), encoding="utf-8")
 
 
 def _write_photo(view: View, folder: Path) -> str:
-    """The path in `folder` of the view's photo, linked where that is possible."""
+    """Write the view's photo to `folder`, as a link where possible, and return its relative path."""
     name = PurePosixPath("images") / PurePosixPath(view.name).name
     relative = PurePosixPath(view.name)
     if not relative.is_absolute() and ".." not in relative.parts:
@@ -84,7 +84,7 @@ def _write_photo(view: View, folder: Path) -> str:
 
 
 def _frame(view: View, path: str, folder: Path) -> dict[str, Any]:
-    """A frame of transforms.json; its mask is written beside."""
+    """Frame of transforms.json; the view's mask is written to `folder`."""
     camera = view.camera
     values: dict[str, Any] = {"file_path": path, "w": camera.width, "h": camera.height}
     values |= {"fl_x": camera.fx, "fl_y": camera.fy, "cx": camera.cx, "cy": camera.cy}
@@ -105,7 +105,7 @@ def _frame(view: View, path: str, folder: Path) -> dict[str, Any]:
 
 
 def _write_points(points: SparsePoints, path: Path) -> None:
-    """Positions (double) and colors as binary PLY."""
+    """Write positions (double) and colors as binary PLY."""
     kinds = [("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("red", "u1"), ("green", "u1"), ("blue", "u1")]
     rows = np.empty(len(points), kinds)
     for column, axis in enumerate("xyz"):

@@ -1,8 +1,8 @@
 """Sparse points of posed photos: SIFT features, matches that the poses allow, triangulation by COLMAP.
 
-The poses are taken as they are: nothing but the points moves. They may be off by a little: a match counts
-where its features lie within `MAX_ERROR` pixels of each other's epipolar line, a track where its point is
-reprojected within that.
+The poses are fixed: only the points are estimated. Small pose errors are tolerated: a match counts where its
+features lie within MAX_ERROR_PIXELS of each other's epipolar line, a track where its point is reprojected
+within MAX_ERROR_PIXELS.
 
 Notation: o_i, d_i are a camera's position and the unit world direction of a feature. A match of d_i and d_j
 is allowed where n = d_i x (o_j - o_i), made unit, has |n . d_j| (the sine of the angle between d_j and the
@@ -32,27 +32,29 @@ from cagefield.files.temporary_folders import TemporaryFolder
 
 FloatArray = npt.NDArray[np.float64]
 
-LONGER_SIDE = 1000
-"""Photos are shrunk to this many pixels for features."""
+TRIANGULATION_SIDE_PIXELS = 1000
+"""Longer side to which photos are shrunk for feature extraction."""
 
-MAX_ERROR = 4.0
-"""Pixels of the shrunk photos by which features may miss epipolar lines and reprojected points."""
+MAX_ERROR_PIXELS = 4.0
+"""Maximum distance of features from epipolar lines and reprojected points, pixels of the shrunk photos."""
 
-MOST_PAIRS = 1000
-"""Photos of which more pairs than these look the same way are paired with their nearest alone."""
+MAX_PAIRS = 1000
+"""Maximum number of pairs with similar viewing directions; of more, each photo keeps its nearest."""
 
-LEAST_NEIGHBOURS = 12
+MIN_NEIGHBORS = 12
 
-FEW = 1000
-"""Fewer points than these are made again with tracks of two photos."""
+MIN_TRIANGULATED_POINTS = 1000
+"""Minimum number of points; fewer are triangulated again with tracks of two photos."""
 
-_EDGE = 3  # pixels beside a cut-out's outline in which its features are not of its surface
-_FLIP = np.array([1.0, -1.0, -1.0])
+_EDGE_PIXELS = 3  # pixels beside a cut-out's outline in which its features are not of its surface
+_OPENGL_TO_OPENCV = np.array([1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True)
 class ShrunkPhoto:
-    """A photo as features are found in it: its camera at that size, its share of the whole photo's size."""
+    """Photo at the size of feature extraction: its camera at that size, and that size over the whole
+    photo's.
+    """
 
     view: View
     camera: Camera
@@ -63,9 +65,9 @@ class ShrunkPhoto:
 def triangulate(
     views: Sequence[View], *, on_progress: OnProgress | None = None, seed: int = 0
 ) -> SparsePoints | None:
-    """Points that at least two of the posed `views` see; None where there are none.
+    """Sparse points that at least two of the posed `views` see; None where there are none.
 
-    `errors` are in pixels of the whole photos. The same views and seed give the same points.
+    `errors` are in pixels of the whole photos. The result is determined by views and seed.
 
     Raises DatasetError where pycolmap is missing, or a photo cannot be read.
     """
@@ -76,7 +78,7 @@ def triangulate(
         shrunk, names = shrink_views(views, folder, on_progress)
         database = folder / "database.db"
         center, scale = normalization([one.camera for one in shrunk])
-        cameras = [_colmap_camera(pycolmap, one.camera) for one in shrunk]
+        cameras = [_build_camera(pycolmap, one.camera) for one in shrunk]
         features.create_database(database, cameras, [Photo(n, i) for i, n in enumerate(names)])
         count = 4096 if len(views) <= 150 else 2048
         extract_features(database, folder, names, count, features.share(on_progress, 0.05, 0.45))
@@ -94,37 +96,45 @@ def triangulate(
         model = posed_model(pycolmap, cameras, numbers, shrunk, names, center, scale)
         to_world = Similarity(scale, np.eye(3), center)
         points = None
-        for least in (3, 2):
-            found = triangulated(
-                pycolmap, model, database, folder, f"sparse-{least}", MAX_ERROR, least_photos=least, seed=seed
+        for min_photos in (3, 2):
+            found = triangulate_tracks(
+                pycolmap,
+                model,
+                database,
+                folder,
+                f"sparse-{min_photos}",
+                MAX_ERROR_PIXELS,
+                min_photos=min_photos,
+                seed=seed,
             )
             points = collect_points(found, shrunk, keypoints, to_world)
-            if points is not None and len(points) >= FEW:
+            if points is not None and len(points) >= MIN_TRIANGULATED_POINTS:
                 break
         features.share(on_progress, 0.0, 1.0)(1.0, f"{0 if points is None else len(points)} points")
         return points
 
 
 def nearest_pairs(cameras: Sequence[Camera]) -> list[tuple[int, int]]:
-    """Pairs (i, j), i < j, of cameras that may see the same: they look less than 90 degrees apart.
+    """Pairs (i, j), i < j, of cameras that may overlap: their viewing directions are less than 90 degrees
+    apart.
 
-    Where these are more than `MOST_PAIRS`, each camera keeps its nearest, by the angle between the axes over
+    Where there are more than `MAX_PAIRS`, each camera keeps its nearest, by the angle between the axes over
     45 degrees plus the distance over the cameras' spread: half of its share in order, and of the following
-    ones every second, which have more parallax.
+    cameras every second, which have more parallax.
     """
     origins = np.stack([camera.origin for camera in cameras])
     forward = np.stack([camera.forward for camera in cameras])
     spread = float(np.median(np.linalg.norm(origins - origins.mean(axis=0), axis=1))) or 1.0
     angle = np.degrees(np.arccos(np.clip(forward @ forward.T, -1.0, 1.0)))
     distance = np.linalg.norm(origins[:, None] - origins[None], axis=2) / spread
-    wide = np.array([camera.model == "opencv_fisheye" for camera in cameras])
-    allowed = (angle < 90.0) | (wide[:, None] & wide[None])
+    is_fisheye = np.array([camera.model == "opencv_fisheye" for camera in cameras])
+    allowed = (angle < 90.0) | (is_fisheye[:, None] & is_fisheye[None])
     np.fill_diagonal(allowed, False)
-    if np.count_nonzero(allowed) // 2 <= MOST_PAIRS:
+    if np.count_nonzero(allowed) // 2 <= MAX_PAIRS:
         first, second = np.nonzero(np.triu(allowed))
         return list(zip(first.tolist(), second.tolist(), strict=True))
     score = np.where(allowed, angle / 45.0 + distance, np.inf)
-    count = max(LEAST_NEIGHBOURS, 2 * MOST_PAIRS // len(cameras))
+    count = max(MIN_NEIGHBORS, 2 * MAX_PAIRS // len(cameras))
     ranks = [*range(count // 2), *range(count // 2, count // 2 + 2 * (count - count // 2), 2)]
     pairs = set()
     for i in range(len(cameras)):
@@ -138,7 +148,7 @@ def nearest_pairs(cameras: Sequence[Camera]) -> list[tuple[int, int]]:
 def shrink_views(
     views: Sequence[View], folder: Path, on_progress: OnProgress | None, square: bool = False
 ) -> tuple[list[ShrunkPhoto], list[str]]:
-    """Photos shrunk into `folder`/colmap, masks in `folder`/masks, and the names of their files.
+    """(shrunk photos, names of their files): photos in `folder`/colmap, masks in `folder`/masks.
 
     With `square` their height is changed so that both focal lengths are equal.
     """
@@ -155,66 +165,68 @@ def shrink_views(
 def extract_features(
     database: Path, folder: Path, names: Sequence[str], count: int, on_progress: OnProgress
 ) -> None:
-    """At most `count` features of each of the photos that `shrink_views` wrote into `folder`."""
+    """Extract at most `count` features of each of the photos that `shrink_views` wrote to `folder`."""
     masks = folder / "masks"
     features.extract(
         database,
         folder / "colmap",
         names,
         features=count,
-        longer_side=LONGER_SIDE,
+        longer_side=TRIANGULATION_SIDE_PIXELS,
         masks=masks if any(masks.iterdir()) else None,
         on_progress=on_progress,
     )
 
 
 def _shrink(view: View, folder: Path, name: str, square: bool) -> ShrunkPhoto:
-    """The photo, shrunk, in `folder`/colmap; its mask in `folder`/masks where it is a cut-out or masked."""
+    """Shrunk photo, written to `folder`/colmap; its mask in `folder`/masks where it is a cut-out or
+    masked.
+    """
     whole = view.whole()
     pixels, valid = whole.load(), whole.valid_pixels()
     height, width = pixels.shape[:2]
-    scale = min(1.0, LONGER_SIDE / max(width, height))
+    scale = min(1.0, TRIANGULATION_SIDE_PIXELS / max(width, height))
     aspect = whole.camera.fx / whole.camera.fy if square else 1.0
     size = max(1, round(width * scale)), max(1, round(height * scale * aspect))
-    used = np.ones((height, width), bool) if valid is None else valid
+    is_valid = np.ones((height, width), bool) if valid is None else valid
     if pixels.shape[2] == 4:
-        used = used & (pixels[..., 3] > 127)
-    if not used.all():
-        mask = Image.fromarray(used).convert("L").resize(size, Image.Resampling.BOX)
-        inside = binary_erosion(np.asarray(mask) > 127, iterations=_EDGE, border_value=True)
+        is_valid = is_valid & (pixels[..., 3] > 127)
+    if not is_valid.all():
+        mask = Image.fromarray(is_valid).convert("L").resize(size, Image.Resampling.BOX)
+        inside = binary_erosion(np.asarray(mask) > 127, iterations=_EDGE_PIXELS, border_value=True)
         Image.fromarray(np.where(inside, 255, 0).astype(np.uint8)).save(folder / "masks" / f"{name}.png")
     if pixels.shape[2] == 4:
         alpha = pixels[..., 3:].astype(np.float32) / 255.0
         pixels = np.rint(pixels[..., :3] * alpha + 127.0 * (1.0 - alpha)).astype(np.uint8)
-    picture = Image.fromarray(pixels)
-    if picture.size != size:
-        picture = picture.resize(size, Image.Resampling.BOX)
-    picture.save(folder / "colmap" / name, compress_level=1)
-    return ShrunkPhoto(view, whole.camera.resized(*size), size[0] / width, np.asarray(picture))
+    image = Image.fromarray(pixels)
+    if image.size != size:
+        image = image.resize(size, Image.Resampling.BOX)
+    image.save(folder / "colmap" / name, compress_level=1)
+    return ShrunkPhoto(view, whole.camera.resized(*size), size[0] / width, np.asarray(image))
 
 
 def normalization(cameras: Sequence[Camera]) -> tuple[FloatArray, float]:
-    """The middle [3] of the cameras, and their median distance to it."""
+    """(mean position [3] of the cameras, their median distance to it)."""
     origins = np.stack([camera.origin for camera in cameras])
-    centre = origins.mean(axis=0)
-    return centre, float(np.median(np.linalg.norm(origins - centre, axis=1))) or 1.0
+    center = origins.mean(axis=0)
+    return center, float(np.median(np.linalg.norm(origins - center, axis=1))) or 1.0
 
 
-def _colmap_camera(pycolmap: Any, camera: Camera) -> Any:
-    """The COLMAP camera of a lens; an opencv lens becomes a pinhole, and its features are undistorted."""
+def _build_camera(pycolmap: Any, camera: Camera) -> Any:
+    """COLMAP camera of a lens; an opencv lens becomes a pinhole, and its features are undistorted."""
     intrinsics = [camera.fx, camera.fy, camera.cx, camera.cy]
     model, params = "PINHOLE", intrinsics
     if camera.model == "opencv_fisheye":
         model, params = "OPENCV_FISHEYE", [*intrinsics, *camera.distortion]
-    made = pycolmap.Camera(model=model, width=camera.width, height=camera.height, params=params)
-    made.has_prior_focal_length = True
-    return made
+    colmap_camera = pycolmap.Camera(model=model, width=camera.width, height=camera.height, params=params)
+    colmap_camera.has_prior_focal_length = True
+    return colmap_camera
 
 
 def _allow_matches(pycolmap: Any, path: Path, shrunk: Sequence[ShrunkPhoto]) -> list[FloatArray]:
-    """Writes the matches that the poses allow as verified ones, and undistorted features.
+    """Write the matches that agree with the poses as verified ones, and undistorted features.
 
-    Returns each photo's features [K,2] where they are in the shrunk photo.
+    Returns each photo's features [K,2] in pixels of the shrunk photo.
     """
     keypoints: list[FloatArray] = []
     directions: list[FloatArray] = []
@@ -228,38 +240,38 @@ def _allow_matches(pycolmap: Any, path: Path, shrunk: Sequence[ShrunkPhoto]) -> 
             )
             image = (found - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
             local, seen = lenses.unproject(image, camera.model, camera.distortion)
-            world = local * _FLIP @ camera.c2w[:3, :3].T
+            world = local * _OPENGL_TO_OPENCV @ camera.c2w[:3, :3].T
             directions.append(np.where(seen[:, None], world, np.nan))
             keypoints.append(found)
             if camera.model == "opencv" and len(found):
-                flat = local[:, :2] / local[:, 2:] * (camera.fx, camera.fy) + (camera.cx, camera.cy)
-                database.update_keypoints(index, flat.astype(np.float32))
+                undistorted = local[:, :2] / local[:, 2:] * (camera.fx, camera.fy) + (camera.cx, camera.cy)
+                database.update_keypoints(index, undistorted.astype(np.float32))
         for pair, matches in zip(*database.read_all_matches(), strict=True):
             first, second = (number - 1 for number in pycolmap.pair_id_to_image_pair(pair))
-            kept = matches[_allowed(shrunk, directions, first, second, matches)]
-            if len(kept) < 8:
+            allowed_matches = matches[_is_allowed(shrunk, directions, first, second, matches)]
+            if len(allowed_matches) < 8:
                 continue
             geometry = pycolmap.TwoViewGeometry(
-                config=pycolmap.TwoViewGeometryConfiguration.CALIBRATED, inlier_matches=kept
+                config=pycolmap.TwoViewGeometryConfiguration.CALIBRATED, inlier_matches=allowed_matches
             )
             database.write_two_view_geometry(first + 1, second + 1, geometry)
     return keypoints
 
 
-def _allowed(
+def _is_allowed(
     shrunk: Sequence[ShrunkPhoto], directions: Sequence[FloatArray], first: int, second: int, matches: Any
 ) -> npt.NDArray[np.bool_]:
-    """Which matches [K,2] lie within MAX_ERROR pixels of each other's epipolar planes."""
+    """Mask [K] of the matches [K,2] within MAX_ERROR_PIXELS of each other's epipolar planes."""
     baseline = shrunk[second].camera.origin - shrunk[first].camera.origin
     one, other = directions[first][matches[:, 0]], directions[second][matches[:, 1]]
-    kept = np.ones(len(matches), dtype=bool)
+    is_allowed = np.ones(len(matches), dtype=bool)
     for a, b, index in ((one, other, second), (other, one, first)):
         normal = np.cross(a, baseline)
         length = np.linalg.norm(normal, axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
             sine = np.abs(np.einsum("ni,ni->n", normal, b)) / length
-            kept &= sine * shrunk[index].camera.fx <= MAX_ERROR
-    return kept
+            is_allowed &= sine * shrunk[index].camera.fx <= MAX_ERROR_PIXELS
+    return is_allowed
 
 
 def posed_model(
@@ -271,7 +283,7 @@ def posed_model(
     center: FloatArray,
     scale: float,
 ) -> Any:
-    """A reconstruction with the known poses, the cameras' middle at the origin, `scale` the unit.
+    """Reconstruction with the known poses, in units of `scale` and with `center` as its origin.
 
     Photo n has the camera `cameras[numbers[n]]`.
     """
@@ -279,7 +291,7 @@ def posed_model(
     for camera in cameras:
         model.add_camera_with_trivial_rig(camera)
     for index, (number, one, name) in enumerate(zip(numbers, shrunk, names, strict=True), start=1):
-        rotation, _ = _nearest_rotation(one.camera.c2w[:3, :3] * _FLIP)
+        rotation, _ = _nearest_rotation(one.camera.c2w[:3, :3] * _OPENGL_TO_OPENCV)
         origin = (one.camera.origin - center) / scale
         rigid = pycolmap.Rigid3d(pycolmap.Rotation3d(rotation.T), -rotation.T @ origin)
         image = pycolmap.Image(name=name, camera_id=number + 1, image_id=index)
@@ -288,12 +300,12 @@ def posed_model(
 
 
 def _nearest_rotation(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The rotation [3,3] nearest to `matrix`, and its singular values."""
+    """(rotation [3,3] nearest to `matrix`, singular values of `matrix`)."""
     left, values, right = np.linalg.svd(matrix)
     return left @ right, values
 
 
-def triangulated(
+def triangulate_tracks(
     pycolmap: Any,
     model: Any,
     database: Path,
@@ -301,18 +313,18 @@ def triangulated(
     name: str,
     bound: float,
     *,
-    least_photos: int,
+    min_photos: int,
     seed: int,
 ) -> Any:
-    """The model with points of tracks of `least_photos` or more, reprojected within `bound` pixels.
+    """Model with points of tracks of `min_photos` or more, with reprojection errors within `bound` pixels.
 
-    Its files are written to `folder`/`name`. Poses and intrinsics stay.
+    Its files are written to `folder`/`name`. Poses and intrinsics are unchanged.
     """
     options = pycolmap.IncrementalPipelineOptions(
         min_num_matches=8, extract_colors=False, random_seed=seed, fix_existing_frames=True
     )
-    angle = bound / MAX_ERROR  # degrees: a pixel of a shrunk photo is a tenth of one or less
-    options.triangulation.ignore_two_view_tracks = least_photos > 2
+    angle = bound / MAX_ERROR_PIXELS  # degrees: a pixel of a shrunk photo is a tenth of one or less
+    options.triangulation.ignore_two_view_tracks = min_photos > 2
     options.triangulation.random_seed = seed
     options.triangulation.create_max_angle_error = angle
     options.triangulation.continue_max_angle_error = angle
@@ -336,9 +348,9 @@ def triangulated(
 def collect_points(
     model: Any, shrunk: Sequence[ShrunkPhoto], keypoints: Sequence[FloatArray] | None, to_world: Similarity
 ) -> SparsePoints | None:
-    """The model's points in the data set's world, with colors and errors of the photos that see them.
+    """Points of the model in the data set's world, with colors and errors from the photos that see them.
 
-    `keypoints` [K,2] of each photo are where its features are in the shrunk photo; None takes the model's.
+    `keypoints` [K,2] of each photo are its features in the shrunk photo; None takes the model's.
     """
     positions, rgb, seen_by, errors = [], [], [], []
     for _, point in sorted(model.points3D.items()):
@@ -356,7 +368,7 @@ def collect_points(
     if not positions:
         return None
     return SparsePoints(
-        to_world.moved(np.array(positions)),
+        to_world.transform_points(np.array(positions)),
         np.array(rgb, dtype=np.uint8),
         tuple(seen_by),
         np.array(errors, dtype=np.float32),

@@ -10,11 +10,11 @@ from cagefield.datasets.views import SparsePoints
 from cagefield.errors import DatasetError, FieldError
 from cagefield.files.ply import read_ply
 
-_GREY = 128
+_GRAY_VALUE = 128
 
 
 def read_points(path: Path) -> SparsePoints:
-    """The vertices of a PLY file: x, y, z, and red, green, blue (0 to 255), grey where it has no colours.
+    """Vertices of a PLY file: x, y, z, and red, green, blue (0 to 255), gray where it has no colors.
 
     Rows that are not finite are left out.
 
@@ -31,6 +31,6 @@ def read_points(path: Path) -> SparsePoints:
     if all(name in vertex for name in names):
         rgb = np.stack([vertex[name].clip(0, 255).astype(np.uint8) for name in names], axis=1)
     else:
-        rgb = np.full(positions.shape, _GREY, dtype=np.uint8)
+        rgb = np.full(positions.shape, _GRAY_VALUE, dtype=np.uint8)
     finite = np.isfinite(positions).all(axis=1)
     return SparsePoints(positions[finite], rgb[finite])

@@ -1,4 +1,4 @@
-"""Values of `transforms*.json` as programs write them: JSON with small faults, numbers in text, poses."""
+"""Values of `transforms*.json`: tolerant JSON, numbers in text, pose matrices."""
 
 from __future__ import annotations
 
@@ -18,29 +18,30 @@ from cagefield.files.safe_open import MOST_TEXT, read_bytes
 
 FloatArray = npt.NDArray[np.float64]
 
-_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+_BYTE_ORDER_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 # A pattern without an end is taken to the end of the text, so that each character is looked at once.
 _STRING = r'"[^"\\]*(?:\\.[^"\\]*)*(?:"|\Z)'
-_COMMENTS = re.compile(_STRING + r"|//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
-_COMMAS = re.compile(_STRING + r"|,(?=\s*[}\]])", re.DOTALL)
+_COMMENT_PATTERN = re.compile(_STRING + r"|//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
+_COMMA_PATTERN = re.compile(_STRING + r"|,(?=\s*[}\]])", re.DOTALL)
 
 
-def read_json(path: Path, most: int = MOST_TEXT, wanted: str = "with the key 'frames'") -> dict[str, Any]:
-    """The object of a JSON file of at most `most` bytes, in UTF-8, or UTF-16 with its mark.
+def read_json(
+    path: Path, max_bytes: int = MOST_TEXT, expected: str = "with the key 'frames'"
+) -> dict[str, Any]:
+    """Object of a JSON file of at most `max_bytes`, in UTF-8, or UTF-16 with its byte order mark.
 
-    Comments and last commas are passed by; `wanted` is what an error asks of the object.
+    Comments and trailing commas are ignored; `expected` names the object's content in an error. NaN and
+    infinite numbers are kept: the reader of a value checks it.
 
-    NaN and infinite numbers are kept: who reads a value checks it.
-
-    Raises DatasetError, with line and column, for what is no JSON object.
+    Raises DatasetError, with line and column, where the content is no JSON object.
     """
     try:
-        content = read_bytes(path, most)
-        text = content.decode(_MARKS.get(content[:2], "utf-8-sig"))
+        content = read_bytes(path, max_bytes)
+        text = content.decode(_BYTE_ORDER_MARKS.get(content[:2], "utf-8-sig"))
         try:
             values = json_text.loads(text, finite=False)
         except json.JSONDecodeError:
-            values = json_text.loads(_strict(text), finite=False)
+            values = json_text.loads(_to_strict_json(text), finite=False)
     except json.JSONDecodeError as error:
         raise DatasetError(
             f"{path}: not valid JSON at line {error.lineno}, column {error.colno} ({error.msg}); "
@@ -49,17 +50,17 @@ def read_json(path: Path, most: int = MOST_TEXT, wanted: str = "with the key 'fr
     except (OSError, ValueError) as error:
         raise DatasetError(f"{path}: cannot be read ({error})") from None
     if not isinstance(values, dict):
-        raise DatasetError(f"{path}: must be a JSON object {wanted}")
+        raise DatasetError(f"{path}: must be a JSON object {expected}")
     return values
 
 
-def _strict(text: str) -> str:
-    """The text without comments (their lines stay) and without commas before a closing bracket."""
-    return _blanked(_COMMAS, _blanked(_COMMENTS, text))
+def _to_strict_json(text: str) -> str:
+    """Text without comments (their line breaks stay) and without commas before a closing bracket."""
+    return _blank_matches(_COMMA_PATTERN, _blank_matches(_COMMENT_PATTERN, text))
 
 
-def _blanked(pattern: re.Pattern[str], text: str) -> str:
-    """The text with spaces in the place of what a pattern finds outside of strings; line breaks stay."""
+def _blank_matches(pattern: re.Pattern[str], text: str) -> str:
+    """Text with spaces in place of the pattern's matches outside of strings; line breaks stay."""
     parts, at = list[str](), 0
     for found in pattern.finditer(text):
         begin, end = found.span()
@@ -69,8 +70,8 @@ def _blanked(pattern: re.Pattern[str], text: str) -> str:
     return "".join([*parts, text[at:]])
 
 
-def number(where: str, source: dict[str, Any], key: str) -> float | None:
-    """The finite number of a key, in text too; None where the key is missing or null.
+def read_number(where: str, source: dict[str, Any], key: str) -> float | None:
+    """Finite number of a key, given as a number or text; None where the key is missing or null.
 
     Raises DatasetError for anything else.
     """
@@ -88,8 +89,8 @@ def number(where: str, source: dict[str, Any], key: str) -> float | None:
     return found
 
 
-def matrix(where: str, value: Any) -> FloatArray:
-    """A matrix [4,4] of 3 or 4 rows; its entries may be text, and need not be finite."""
+def read_matrix(where: str, value: Any) -> FloatArray:
+    """Matrix [4,4] of 3 or 4 rows; its entries may be text, and need not be finite."""
     try:
         found = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
@@ -101,8 +102,10 @@ def matrix(where: str, value: Any) -> FloatArray:
     return found
 
 
-def without_scale(pose: FloatArray) -> tuple[FloatArray, float]:
-    """The pose [4,4] without the uniform scale of its 3x3 part, and that scale; 1 where there is none."""
+def remove_scale(pose: FloatArray) -> tuple[FloatArray, float]:
+    """(pose [4,4] without the uniform scale of its 3x3 part, that scale); the scale is 1 where there
+    is none.
+    """
     part = pose[:3, :3]
     scale = float(np.cbrt(np.linalg.det(part)))
     if not (0 < scale < np.inf) or abs(scale**2 - 1.0) <= RIGID_TOLERANCE:

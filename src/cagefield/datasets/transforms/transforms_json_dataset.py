@@ -11,9 +11,9 @@ read alike; a key in a frame wins over the same key of the file:
   scene       aabb_scale, scale, offset (Instant-NGP), applied_transform, applied_scale (nerfstudio)
   points      ply_file_path (nerfstudio): a PLY file of sparse points in the file's world
   splits      transforms_train/val/test.json, or train_filenames, val_filenames, test_filenames in one file
-`applied_transform` [3,4] is what nerfstudio did to the reconstruction's coordinates before it wrote the
-poses, `applied_scale` by how much it made that larger: the file's world = applied_scale x applied_transform
-x the reconstruction's. It becomes `Dataset.source_to_world` and moves nothing. A uniform scale in the
+`applied_transform` [3,4] is nerfstudio's map of the reconstruction's coordinates before it wrote the poses,
+`applied_scale` its further scale: the file's world = applied_scale x applied_transform x the
+reconstruction's. The product becomes `Dataset.source_to_world` and moves nothing. A uniform scale in the
 rotation of a pose is taken out. Frames whose pose is missing or not finite, whose photo is missing or listed
 before, and those without file_path are left out, and named.
 """
@@ -29,55 +29,55 @@ import numpy as np
 import numpy.typing as npt
 
 from cagefield.cameras.camera import Camera
-from cagefield.datasets.capture_dataset import uniform_size, warn_of_scaling
+from cagefield.datasets.capture_dataset import common_rescaled_size, warn_of_scaling
 from cagefield.datasets.colmap.colmap_lenses import LensView, report_resampled
-from cagefield.datasets.far_origin import near_origin
+from cagefield.datasets.far_origin import move_near_origin
 from cagefield.datasets.notices import warn
 from cagefield.datasets.photo_names import FoundPhotos, find_photos, view_name
 from cagefield.datasets.photos import choose_downscale, is_cut_out, read_header
 from cagefield.datasets.scene_bounds import cube_of_interest, depths_of_points
 from cagefield.datasets.transforms.point_files import read_points
-from cagefield.datasets.transforms.transforms_json import matrix, number, read_json, without_scale
-from cagefield.datasets.transforms.transforms_lenses import frame_lenses
+from cagefield.datasets.transforms.transforms_json import read_json, read_matrix, read_number, remove_scale
+from cagefield.datasets.transforms.transforms_lenses import build_frame_lenses
 from cagefield.datasets.views import (
     Dataset,
     PhotoMask,
     SparsePoints,
     View,
     hold_out,
-    named,
+    join_names,
     report_missing,
     report_unposed,
 )
 from cagefield.errors import CameraError, DatasetError
 from cagefield.files.safe_open import real_path
 
-LONGEST = 255
-"""Characters in a file's name, at most, on the systems there are."""
+MAX_NAME_CHARACTERS = 255
+"""Maximum characters of a file's name on the usual file systems."""
 
 SPLITS = ("train", "test", "val")
 
-TRANSFORMS = ("transforms.json", "transform.json")
-"""Names of a file that describes all views, the first that is there."""
+TRANSFORMS_FILES = ("transforms.json", "transform.json")
+"""Names of a file that describes all views, in order of preference."""
 
 _SYNTHETIC_HALF_SIZE = 1.5  # the NeRF-synthetic scenes fit in [-1.5, 1.5]^3
 _NGP_SCALE, _NGP_OFFSET = 0.33, 0.5  # Instant-NGP: unit cube coordinates = scale * file coordinates + offset
 
 
 def split_file(folder: Path, split: str) -> Path:
-    """The file of one split's views: transforms_train.json, or transform_train.json where that is there."""
+    """File of one split's views: transforms_train.json, or transform_train.json where that exists."""
     names = [folder / f"{word}_{split}.json" for word in ("transforms", "transform")]
     return next((file for file in names if file.is_file()), names[0])
 
 
 def camera_file(folder: Path) -> Path | None:
-    """The file of this format that a folder has, None where it has none."""
-    files = [split_file(folder, "train"), *(folder / name for name in TRANSFORMS)]
+    """File of this format in a folder, None where there is none."""
+    files = [split_file(folder, "train"), *(folder / name for name in TRANSFORMS_FILES)]
     return next((file for file in files if file.is_file()), None)
 
 
 def load_transforms(path: Path, downscale: int | None, holdout: int) -> Dataset:
-    """The data set of a folder with `transforms.json` or `transforms_train.json`, or of one such file.
+    """Data set of a folder with `transforms.json` or `transforms_train.json`, or of one such file.
 
     A scene of cut-out photos (RGBA, not all opaque) is bounded: [-1.5, 1.5]^3 in the NeRF-synthetic layout,
     else the cube of interest. Anything else is unbounded, with the cube of interest as its inner box.
@@ -96,24 +96,26 @@ def load_transforms(path: Path, downscale: int | None, holdout: int) -> Dataset:
         files = {split: _TransformsFile(file) for split, file in split_files.items() if file.is_file()}
     else:
         files = {"train": _TransformsFile(path if path.is_file() else camera_file(folder) or folder)}
-    main = files["train"]
-    _read_views(folder if synthetic else main.path, folder, list(files.values()))
+    main_file = files["train"]
+    _read_views(folder if synthetic else main_file.path, folder, list(files.values()))
     if synthetic:
         views = {split: files[split].views if split in files else [] for split in SPLITS}
     else:
-        views = main.split_views()
+        views = main_file.split_views()
     if not views["train"]:
-        raise DatasetError(f"{main.path}: none of the training views' photos is there; check file_path")
-    everything = [view for split in SPLITS for view in views[split]]
-    factor = choose_downscale(max(max(v.camera.width, v.camera.height) for v in everything), downscale)
+        raise DatasetError(f"{main_file.path}: none of the training views' photos is there; check file_path")
+    all_views = [view for split in SPLITS for view in views[split]]
+    factor = choose_downscale(max(max(v.camera.width, v.camera.height) for v in all_views), downscale)
     split = {name: tuple(view.downscaled(factor) for view in views[name]) for name in SPLITS}
     train, test = split["train"], split["test"] or split["val"]
     if not test:
         train, test = hold_out(train, holdout)
-    cut_out = _are_cut_out(views["train"])
-    points = main.points()
-    unbounded, bounds = _extent(main, [view.camera for view in views["train"]], cut_out, synthetic, points)
-    found = None if points is None else depths_of_points([v.camera for v in everything], points.positions)
+    cut_out = _are_cut_outs(views["train"])
+    points = main_file.points()
+    unbounded, bounds = _bounds(
+        main_file, [view.camera for view in views["train"]], cut_out, synthetic, points
+    )
+    found = None if points is None else depths_of_points([v.camera for v in all_views], points.positions)
     dataset = Dataset(
         name=real_path(folder).name,
         path=folder,
@@ -123,15 +125,15 @@ def load_transforms(path: Path, downscale: int | None, holdout: int) -> Dataset:
         unbounded=unbounded,
         bounds=bounds,
         white_background=cut_out,
-        source_to_world=main.source_to_world(),
+        source_to_world=main_file.source_to_world(),
         depths=None if found is None else (float(found[:, 0].min()), float(found[:, 1].max())),
         points=points,
     )
-    return near_origin(dataset)
+    return move_near_origin(dataset)
 
 
 def _read_views(where: Path, folder: Path, files: Sequence[_TransformsFile]) -> None:
-    """Finds the photos and masks of all files together, and reports what is left out."""
+    """Find the photos and masks of all files together, and report frames that are left out."""
     total = sum(file.total for file in files)
     names = [name for file in files for name in file.names("file_path")]
     photos = find_photos(folder, names)
@@ -139,20 +141,20 @@ def _read_views(where: Path, folder: Path, files: Sequence[_TransformsFile]) -> 
     for file in files:
         file.read_views(folder, photos, masks)
 
-    def together(kind: str) -> list[str]:
+    def gather(kind: str) -> list[str]:
         return [name for file in files for name in getattr(file, kind)]
 
-    report_missing(where, together("missing"), total)
+    report_missing(where, gather("missing"), total)
     photos.report(where, folder)
-    report_unposed(where, together("unposed"), total)
-    lost = list(dict.fromkeys(masks.ambiguous + together("without_mask")))
-    for found, what in (
-        (together("unnamed"), "frames are left out, they have no file_path"),
-        (together("repeated"), "frames are left out, their photos are listed before"),
-        (lost, "masks are not used, their files are missing"),
+    report_unposed(where, gather("unposed"), total)
+    missing_masks = list(dict.fromkeys(masks.ambiguous + gather("without_mask")))
+    for found, note in (
+        (gather("unnamed"), "frames are left out, they have no file_path"),
+        (gather("repeated"), "frames are left out, their photos are listed before"),
+        (missing_masks, "masks are not used, their files are missing"),
     ):
         if found:
-            warn(f"{where}: {len(found)} {what}: {named(found)}")
+            warn(f"{where}: {len(found)} {note}: {join_names(found)}")
     report_resampled(str(where), [lens for file in files for lens in file.lenses])
     scales = [scale for file in files for scale in file.scales]
     if scales:
@@ -164,7 +166,7 @@ def _read_views(where: Path, folder: Path, files: Sequence[_TransformsFile]) -> 
 
 @dataclass
 class _TransformsFile:
-    """One file: its full-size views, and the names of frames that are left out, by reason."""
+    """One transforms file: its full-size views, and the names of frames that are left out, by reason."""
 
     path: Path
     values: dict[str, Any] = field(init=False)
@@ -177,7 +179,7 @@ class _TransformsFile:
     unnamed: list[str] = field(init=False, default_factory=list)
     repeated: list[str] = field(init=False, default_factory=list)
     without_mask: list[str] = field(init=False, default_factory=list)
-    photo_of: dict[str, Path] = field(init=False, default_factory=dict)
+    photo_by_name: dict[str, Path] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         self.values = read_json(self.path)
@@ -193,40 +195,43 @@ class _TransformsFile:
                 name = frame.get(key)
                 if name is None or name == "":
                     continue
-                if not isinstance(name, str) or max(map(len, view_name(name).split("/"))) > LONGEST:
+                if (
+                    not isinstance(name, str)
+                    or max(map(len, view_name(name).split("/"))) > MAX_NAME_CHARACTERS
+                ):
                     raise DatasetError(f"{where}: key {key!r} must name the photo, got {name!r:.80}")
 
     def names(self, key: str) -> list[str]:
-        """The files that the frames name."""
+        """Names of files at a key of the frames."""
         return [frame[key] for frame in self.values["frames"] if frame.get(key)]
 
     def read_views(self, folder: Path, photos: FoundPhotos, masks: FoundPhotos) -> None:
-        """Reads the frames whose photos were found."""
+        """Read the frames whose photos were found."""
         read: list[tuple[str, Path, npt.NDArray[np.float64], tuple[LensView, ...], PhotoMask | None]] = []
-        known: set[Path] = set()
+        seen_photos: set[Path] = set()
         for index, frame in enumerate(self.values["frames"]):
             file_path = frame.get("file_path")
             if not file_path:
                 self.unnamed.append(f"frames[{index}]")
                 continue
-            name, photo = photos.name_of(file_path, folder), photos.photos.get(file_path)
+            name, photo = photos.relative_view_name(file_path, folder), photos.photos.get(file_path)
             if photo is not None:
-                self.photo_of[view_name(file_path)] = photo
+                self.photo_by_name[view_name(file_path)] = photo
             where = f"{self.path}: frames[{index}] ({name})"
             pose = frame.get("transform_matrix")
-            pose = None if pose is None else matrix(f"{where}: key 'transform_matrix'", pose)
+            pose = None if pose is None else read_matrix(f"{where}: key 'transform_matrix'", pose)
             if photo is None:
                 self.missing.append(name)
             elif pose is None or not np.isfinite(pose).all():
                 self.unposed.append(name)
-            elif photo in known:
+            elif photo in seen_photos:
                 self.repeated.append(name)
             else:
-                known.add(photo)
-                pose, scale = without_scale(pose)
+                seen_photos.add(photo)
+                pose, scale = remove_scale(pose)
                 self.scales += [] if scale == 1.0 else [scale]
                 try:
-                    lenses = frame_lenses(where, self.values, frame, read_header(photo))
+                    lenses = build_frame_lenses(where, self.values, frame, read_header(photo))
                     lenses[0].camera.with_c2w(pose)
                 except CameraError as error:
                     raise DatasetError(f"{where}: {str(error).replace('c2w', 'transform_matrix')}") from error
@@ -256,29 +261,33 @@ class _TransformsFile:
         return PhotoMask(masks.photos[name])
 
     def _size_of_photos(self, read: Sequence[tuple[str, Path, LensView]]) -> tuple[int, int] | None:
-        """The size that all photos were scaled to since the file was written; None where it says theirs.
+        """(width, height) to which all photos were scaled since the file was written; None where sizes agree.
 
         Raises DatasetError where photos have another size for any other reason.
         """
         headers = [read_header(photo) for _, photo, _ in read]
-        said = [lens.size for _, _, lens in read]
+        camera_sizes = [lens.size for _, _, lens in read]
         found = [(header.width, header.height) for header in headers]
-        if said == found:
+        if camera_sizes == found:
             return None
-        size = uniform_size(said, found)
+        size = common_rescaled_size(camera_sizes, found)
         if size is None:
-            index = next(i for i in range(len(said)) if said[i] != found[i])
-            key, value = ("w", said[index][0]) if said[index][0] != found[index][0] else ("h", said[index][1])
+            index = next(i for i in range(len(camera_sizes)) if camera_sizes[i] != found[i])
+            key, value = (
+                ("w", camera_sizes[index][0])
+                if camera_sizes[index][0] != found[index][0]
+                else ("h", camera_sizes[index][1])
+            )
             raise DatasetError(
                 f"{self.path}: frame {read[index][0]}: key {key!r} is {value}, but "
                 f"{read[index][1]} is {found[index][0]}x{found[index][1]}; use the photos that "
                 "the intrinsics belong to, or scale w, h, fl_x, fl_y, cx and cy to these"
             )
-        warn_of_scaling(str(self.path), said[0], size)
+        warn_of_scaling(str(self.path), camera_sizes[0], size)
         return size
 
     def split_views(self) -> dict[str, list[View]]:
-        """The views by split, as the file's own lists say; all in train where it has none."""
+        """Views by split, from the file's own lists; all in train where it has no lists."""
         listed: dict[str, set[Path]] = {}
         unknown: list[str] = []
         for split in SPLITS:
@@ -287,23 +296,26 @@ class _TransformsFile:
                 continue
             if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
                 raise DatasetError(f"{self.path}: key {key!r} must be a list of file names")
-            listed[split] = {self.photo_of[n] for n in map(view_name, names) if n in self.photo_of}
-            known = {*self.missing, *self.photo_of}
-            unknown += [name for name in map(view_name, names) if name not in known]
+            listed[split] = {self.photo_by_name[n] for n in map(view_name, names) if n in self.photo_by_name}
+            known_names = {*self.missing, *self.photo_by_name}
+            unknown += [name for name in map(view_name, names) if name not in known_names]
         if unknown:
-            warn(f"{self.path}: {len(unknown)} names in its lists of splits are no frame's: {named(unknown)}")
+            warn(
+                f"{self.path}: {len(unknown)} names in its lists of splits are no frame's: "
+                f"{join_names(unknown)}"
+            )
         held_out = listed.get("test", set()) | listed.get("val", set())
         listed.setdefault("train", {view.image_path for view in self.views} - held_out)
         unused = [v.name for v in self.views if v.image_path not in held_out | listed["train"]]
         if unused:
             warn(
                 f"{self.path}: {len(unused)} frames are left out, its lists of splits have none of them: "
-                f"{named(unused)}"
+                f"{join_names(unused)}"
             )
         return {split: [v for v in self.views if v.image_path in listed.get(split, ())] for split in SPLITS}
 
     def points(self) -> SparsePoints | None:
-        """The points of `ply_file_path`; None, with a warning, where the file cannot be read."""
+        """Sparse points of `ply_file_path`; None, with a warning, where the file cannot be read."""
         name = self.values.get("ply_file_path")
         if name is None:
             return None
@@ -317,12 +329,12 @@ class _TransformsFile:
         return found if len(found) else None
 
     def source_to_world(self) -> npt.NDArray[np.float64]:
-        """nerfstudio's `applied_scale` x `applied_transform` [4,4]; the identity without them."""
+        """Matrix [4,4] of nerfstudio's `applied_scale` x `applied_transform`; the identity without them."""
         where = str(self.path)
         found = np.eye(4)
         if self.values.get("applied_transform") is not None:
-            found = matrix(f"{where}: key 'applied_transform'", self.values["applied_transform"])
-        scale = number(where, self.values, "applied_scale")
+            found = read_matrix(f"{where}: key 'applied_transform'", self.values["applied_transform"])
+        scale = read_number(where, self.values, "applied_scale")
         if scale is not None and scale <= 0:
             raise DatasetError(f"{where}: key 'applied_scale' must be positive, got {scale:g}")
         if not np.isfinite(found).all() or abs(np.linalg.det(found)) < 1e-12:
@@ -331,22 +343,24 @@ class _TransformsFile:
         return found
 
 
-def _are_cut_out(views: list[View]) -> bool:
-    """Whether the photos are cut-outs: RGBA and, in the first, middle or last one, somewhere transparent."""
+def _are_cut_outs(views: list[View]) -> bool:
+    """Whether the photos are cut-outs: RGBA and, in the first, middle or last photo, somewhere
+    transparent.
+    """
     probes = {view.image_path for view in (views[0], views[len(views) // 2], views[-1])}
     return any(is_cut_out(photo) for photo in probes)
 
 
-def _extent(
+def _bounds(
     file: _TransformsFile,
     cameras: list[Camera],
     cut_out: bool,
     synthetic: bool,
     points: SparsePoints | None,
 ) -> tuple[bool, npt.NDArray[np.float64]]:
-    """Whether the scene is unbounded, and its bounds [2,3]."""
+    """(whether the scene is unbounded, its bounds [2,3])."""
     where = str(file.path)
-    aabb_scale = number(where, file.values, "aabb_scale")
+    aabb_scale = read_number(where, file.values, "aabb_scale")
     if aabb_scale is not None and aabb_scale <= 0:
         raise DatasetError(
             f"{where}: key 'aabb_scale' must be positive, got {aabb_scale:g}; 1 is the unit cube"
@@ -362,7 +376,7 @@ def _extent(
 
 
 def _box(where: str, value: object) -> npt.NDArray[np.float64]:
-    """The scene's box that a file gives as [[min], [max]]."""
+    """Scene box [2,3] that a file gives as [[min], [max]]."""
     try:
         box = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
@@ -374,7 +388,7 @@ def _box(where: str, value: object) -> npt.NDArray[np.float64]:
 
 def _ngp_unit_cube(file: _TransformsFile) -> npt.NDArray[np.float64]:
     """Instant-NGP's unit cube in the file's coordinates."""
-    scale = number(str(file.path), file.values, "scale")
+    scale = read_number(str(file.path), file.values, "scale")
     scale = _NGP_SCALE if scale is None else scale
     try:
         offset = np.broadcast_to(np.array(file.values.get("offset", _NGP_OFFSET), dtype=np.float64), 3)

@@ -1,5 +1,4 @@
-"""Intrinsics and lenses of `transforms*.json`; see `datasets.transforms.transforms_json_dataset` for the
-keys."""
+"""Intrinsics and lenses of `transforms*.json`; `transforms_json_dataset` lists the keys."""
 
 from __future__ import annotations
 
@@ -11,21 +10,27 @@ import numpy as np
 from cagefield.cameras.camera import Camera
 from cagefield.datasets.colmap.colmap_lenses import LensView, lens_views
 from cagefield.datasets.photos import Header
-from cagefield.datasets.transforms.transforms_json import number
+from cagefield.datasets.transforms.transforms_json import read_number
 from cagefield.datasets.undistortion import EQUIRECTANGULAR
 from cagefield.errors import DatasetError
 
-PERSPECTIVE: Final = (
+PERSPECTIVE_MODELS: Final = (
     "OPENCV", "OPENCV5", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE",
 )  # fmt: skip
-"""Models of which k1, k2, p1, p2, k3, k4 are read, as far as they are given."""
+"""Models with the coefficients k1, k2, p1, p2, k3, k4, as far as they are given."""
 
-FISHEYE: Final = ("OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "SIMPLE_FISHEYE", "FISHEYE")
-"""Models of which k1, k2, k3, k4 are read, as far as they are given."""
+FISHEYE_MODELS: Final = (
+    "OPENCV_FISHEYE",
+    "SIMPLE_RADIAL_FISHEYE",
+    "RADIAL_FISHEYE",
+    "SIMPLE_FISHEYE",
+    "FISHEYE",
+)
+"""Models with the coefficients k1, k2, k3, k4, as far as they are given."""
 
-PANORAMIC: Final = (EQUIRECTANGULAR, "SPHERICAL", "LATLONG")
+PANORAMIC_MODELS: Final = (EQUIRECTANGULAR, "SPHERICAL", "LATLONG")
 
-RESAMPLED: Final[dict[str, tuple[str, ...]]] = {
+RESAMPLED_PARAMETERS: Final[dict[str, tuple[str, ...]]] = {
     "FULL_OPENCV": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
     "FOV": ("omega",),
     "THIN_PRISM_FISHEYE": ("k1", "k2", "p1", "p2", "k3", "k4", "sx1", "sy1"),
@@ -35,22 +40,22 @@ RESAMPLED: Final[dict[str, tuple[str, ...]]] = {
     "DIVISION": ("k",),
     "EUCM": ("alpha", "beta"),
 }  # fmt: skip
-"""COLMAP's names of the parameters after fx, fy, cx, cy of models that may have no lens of ours."""
+"""COLMAP's parameter names after fx, fy, cx, cy, of models that `Camera` may not have."""
 
-_ALIASES: Final = {"THIN_PRISM": "THIN_PRISM_FISHEYE", "SIMPLE_DIVISION": "DIVISION"}
+_MODEL_ALIASES: Final = {"THIN_PRISM": "THIN_PRISM_FISHEYE", "SIMPLE_DIVISION": "DIVISION"}
 
 
-def frame_lenses(
+def build_frame_lenses(
     where: str, values: dict[str, Any], frame: dict[str, Any], header: Header
 ) -> tuple[LensView, ...]:
-    """The views, in the identity pose, of a frame's photo, of the size that the file says.
+    """Views, in the identity pose, of a frame's photo, of the size given in the file.
 
-    Raises DatasetError for keys that say nothing sensible, CameraError for values that no camera has.
+    Raises DatasetError for invalid keys, CameraError for values that no camera has.
     """
     merged = {**values, **frame}
     width, height = _size(where, merged, header)
     model = _model(where, merged)
-    if model in PANORAMIC:
+    if model in PANORAMIC_MODELS:
         return lens_views(EQUIRECTANGULAR, (), width, height)
     fx, fy = _focal_lengths(where, frame, width, height)
     if fx is None and fy is None:
@@ -58,19 +63,19 @@ def frame_lenses(
     fx, fy = (fy if fx is None else fx), (fx if fy is None else fy)
     if fx is None or fy is None:
         raise DatasetError(f"{where}: no focal length; give fl_x (pixels) or camera_angle_x (radians)")
-    cx, cy = number(where, merged, "cx"), number(where, merged, "cy")
+    cx, cy = read_number(where, merged, "cx"), read_number(where, merged, "cy")
     axis = 0.5 * width if cx is None else cx, 0.5 * height if cy is None else cy
-    if model in RESAMPLED:
-        params = tuple(number(where, merged, key) or 0.0 for key in RESAMPLED[model])
+    if model in RESAMPLED_PARAMETERS:
+        params = tuple(read_number(where, merged, key) or 0.0 for key in RESAMPLED_PARAMETERS[model])
         try:
             return lens_views(model, (fx, fy, *axis, *params), width, height)
         except DatasetError as error:
             raise DatasetError(f"{where}: {error}") from None
-    keys = ("k1", "k2", "k3", "k4") if model in FISHEYE else ("k1", "k2", "p1", "p2", "k3", "k4")
+    keys = ("k1", "k2", "k3", "k4") if model in FISHEYE_MODELS else ("k1", "k2", "p1", "p2", "k3", "k4")
     if merged.get("k1") is None and "k" in merged:
         merged["k1"] = merged["k"]
-    distortion = tuple(number(where, merged, key) or 0.0 for key in keys)
-    if model in FISHEYE:
+    distortion = tuple(read_number(where, merged, key) or 0.0 for key in keys)
+    if model in FISHEYE_MODELS:
         camera = Camera(np.eye(4), width, height, fx, fy, *axis, "opencv_fisheye", distortion)
     elif any(distortion):
         camera = Camera(np.eye(4), width, height, fx, fy, *axis, "opencv", distortion)
@@ -80,14 +85,14 @@ def frame_lenses(
 
 
 def _model(where: str, merged: dict[str, Any]) -> str:
-    """The camera model's name in capitals; OPENCV where the file names none."""
+    """Name of the camera model in capitals; OPENCV where the file names none."""
     name = merged.get("camera_model")
     name = "OPENCV" if name is None else name
-    upper = _ALIASES.get(name.upper(), name.upper()) if isinstance(name, str) else ""
-    known = (*PERSPECTIVE, *FISHEYE, *PANORAMIC, *RESAMPLED)
-    if upper not in known:
+    model = _MODEL_ALIASES.get(name.upper(), name.upper()) if isinstance(name, str) else ""
+    known_models = (*PERSPECTIVE_MODELS, *FISHEYE_MODELS, *PANORAMIC_MODELS, *RESAMPLED_PARAMETERS)
+    if model not in known_models:
         raise DatasetError(
-            f"{where}: camera_model {name!r:.40} cannot be read, only {', '.join(known)}; "
+            f"{where}: camera_model {name!r:.40} cannot be read, only {', '.join(known_models)}; "
             "undistort the photos first"
         )
     for key in ("lens_mode", "ftheta_p0"):
@@ -95,12 +100,12 @@ def _model(where: str, merged: dict[str, Any]) -> str:
             raise DatasetError(f"{where}: the lens of key {key!r} cannot be read; undistort the photos first")
     if merged.get("latlong") or merged.get("equirectangular"):
         return EQUIRECTANGULAR
-    return "OPENCV_FISHEYE" if merged.get("is_fisheye") is True else upper
+    return "OPENCV_FISHEYE" if merged.get("is_fisheye") is True else model
 
 
 def _size(where: str, merged: dict[str, Any], header: Header) -> tuple[int, int]:
-    """(width, height) as the file says; the photo's where it says nothing."""
-    width, height = number(where, merged, "w"), number(where, merged, "h")
+    """(width, height) in the file; the photo's where the file has none."""
+    width, height = read_number(where, merged, "w"), read_number(where, merged, "h")
     for key, value in (("w", width), ("h", height)):
         if value is not None and (value < 1 or value != int(value)):
             raise DatasetError(f"{where}: key {key!r} must be a whole number of pixels, got {value:g}")
@@ -113,10 +118,10 @@ def _focal_lengths(
     """Focal lengths in pixels along x and y as far as `source` gives them."""
     found: list[float | None] = []
     for axis, side in (("x", width), ("y", height)):
-        focal = number(where, source, f"fl_{axis}")
+        focal = read_number(where, source, f"fl_{axis}")
         if focal is None:
-            angle = number(where, source, f"camera_angle_{axis}")
-            degrees = number(where, source, f"{axis}_fov")
+            angle = read_number(where, source, f"camera_angle_{axis}")
+            degrees = read_number(where, source, f"{axis}_fov")
             if degrees is not None:
                 angle = math.radians(degrees)
             if angle is not None:

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field, TypeAdapter
 
-from cagefield.cameras.camera_paths import LEAST_FPS
+from cagefield.cameras.camera_paths import MIN_FPS
 from cagefield.edits.options import LATTICE_RANGE
 from cagefield.server.editor.drag_solver import Target
 from cagefield.server.editor.edit_kinds import Kind
@@ -279,7 +279,7 @@ class RenderJob(Message):
     out: Annotated[str, Field(min_length=1, max_length=1000)]
     width: Annotated[int, Field(ge=16, le=4096)] = 800
     height: Annotated[int, Field(ge=16, le=4096)] = 800
-    fps: Annotated[float, Field(ge=LEAST_FPS, le=120)] = 24.0
+    fps: Annotated[float, Field(ge=MIN_FPS, le=120)] = 24.0
     overwrite: bool = False
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Still, stills
 from cagefield.errors import CagefieldError
-from cagefield.images.video import is_ours
+from cagefield.images.video import is_cagefield_video
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.path_edits import blended
 from cagefield.server.protocol.common import JobKind
@@ -90,7 +90,7 @@ def camera_path(
         raise CagefieldError(f"{out} is a folder; give the name of a video, ending in .mp4")
     if out.exists() and not overwrite:
         raise CagefieldError(f"{out} exists already; give another name, or choose to overwrite")
-    if out.exists() and not is_ours(out):
+    if out.exists() and not is_cagefield_video(out):
         raise CagefieldError(f"{out} is a video that cagefield did not make, and stays; give another name")
     found = stills(document.keys, loop=document.loop, fps=fps, width=size[0], height=size[1])
     return Job(number, "camera_path", out, fps, found, document)

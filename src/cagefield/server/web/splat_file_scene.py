@@ -45,7 +45,7 @@ _MOST_OF_ONE = 1 << 14
 """Bytes of a splat, with whatever else is known of it, in a file that is _LARGE."""
 
 
-def opened_folder() -> Path:
+def open_mask_folder() -> Path:
     """The folder of opened files' scenes in the user's cache."""
     return cache_root() / "opened"
 
@@ -64,7 +64,7 @@ def scene_of_file(file: Path) -> Path:
     with _recorded_warnings() as lines:
         source = open_within_memory(file) if file.is_file() and check_regular(file) > _LARGE else None
     end = None if source is None else _end(source)
-    folder = opened_folder() / f"{stem}-{_digest(file, end)}"
+    folder = open_mask_folder() / f"{stem}-{_digest(file, end)}"
     if is_scene(folder):
         os.utime(folder)
     else:

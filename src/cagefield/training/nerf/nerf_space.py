@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cagefield.datasets.nerf_normalization import in_ndc_world, in_unit_cube, why_not_ndc
+from cagefield.datasets.nerf_normalization import ndc_obstacle, normalize_to_ndc, normalize_to_unit_cube
 from cagefield.datasets.views import Dataset
 from cagefield.errors import CagefieldError
 
@@ -54,15 +54,15 @@ def build_sampling_space(dataset: Dataset, ndc: bool | None = None) -> SamplingS
         CagefieldError: `ndc` is True for a capture that is not forward-facing.
     """
     if ndc or (ndc is None and dataset.unbounded):
-        reason = why_not_ndc(dataset)
+        reason = ndc_obstacle(dataset)
         if reason is None:
-            moved, ratios = in_ndc_world(dataset)
+            moved, ratios = normalize_to_ndc(dataset)
             return SamplingSpace(moved, 0.0, 1.0, ndc=ratios)
         if ndc:
             raise CagefieldError(f"{dataset.path} cannot be trained in NDC: {reason}; train it without")
     if not dataset.unbounded:
         return SamplingSpace(dataset, *_depths_of_box(dataset))
-    moved = in_unit_cube(dataset)
+    moved = normalize_to_unit_cube(dataset)
     if moved.depths is not None:
         return SamplingSpace(moved, NEAR_DEPTH_SHARE * moved.depths[0], moved.depths[1], lindisp=True)
     distance = float(np.median([np.linalg.norm(view.camera.origin) for view in moved.train]))

@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cagefield.datasets.sfm.sparse_points import points_cache, points_of
+from cagefield.datasets.sfm.sparse_points import points_cache_folder, starting_points
 from cagefield.datasets.views import Dataset
 from cagefield.fields.splat_field import SplatField
 from cagefield.training.evaluation import Evaluation, evaluate_views
@@ -42,7 +42,7 @@ def train_splat(
 ) -> TrainResult[SplatField]:
     """SplatField trained on the data set's photos, with PSNR and SSIM on its test views.
 
-    A capture without points first gets points from its poses (`points_of`), which are cached; then the
+    A capture without points first gets points from its poses (`starting_points`), which are cached; then the
     photos' surfaces are swept. `seeds` replace both. `on_stage` gets a stage's name, its progress, and a
     note. With `checkpoint`, the state of the run is written every minute and at the end, which Ctrl-C brings
     early (`finished` is then False); `resume` continues the checkpoint. On a CPU a resumed run of given
@@ -58,8 +58,8 @@ def train_splat(
     report = on_stage or (lambda stage, done, note: None)
     points = None
     if seeds is None and (dataset.unbounded or dataset.points is not None):
-        points = points_of(
-            dataset, points_cache(), on_progress=partial(report, "Finding points"), seed=config.seed
+        points = starting_points(
+            dataset, points_cache_folder(), on_progress=partial(report, "Finding points"), seed=config.seed
         )
     if seeds is None:
         report("Finding surfaces", 0.0, "")

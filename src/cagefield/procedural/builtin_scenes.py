@@ -1,4 +1,4 @@
-"""The built-in scenes by name."""
+"""Built-in scenes by name."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SCENES: dict[str, Callable[[], ProceduralScene]] = {
 
 
 def procedural_scene(name: str) -> ProceduralScene:
-    """The built-in scene of that name. Raises SceneError with the names there are."""
+    """Built-in scene of a name. Raises SceneError that lists the names."""
     if name not in SCENES:
         raise SceneError(f"there is no built-in scene {name!r}; choose one of {', '.join(SCENES)}")
     return SCENES[name]()
