@@ -30,7 +30,7 @@ from cagefield.procedural.srgb import decode_srgb, encode_srgb
 from cagefield.procedural.textures import Plain
 from cagefield.procedural.variations import (
     BACKDROP_SHARE,
-    MAX_GAIN,
+    MAX_EXPOSURE_GAIN,
     PERSON_SHARE,
     Changes,
     draw_changes,
@@ -129,7 +129,7 @@ def test_exposures_are_gains_of_linear_light_clipped(captures):
     chosen = changes("room-chair+exposure+person")
     gains = np.array([change.gains for change in chosen])
     assert (gains[~np.array(TRAINING)] == 1).all()
-    assert gains.min() >= 1 / MAX_GAIN - 1e-6 and gains.max() <= MAX_GAIN + 1e-6
+    assert gains.min() >= 1 / MAX_EXPOSURE_GAIN - 1e-6 and gains.max() <= MAX_EXPOSURE_GAIN + 1e-6
     assert gains.max() > 1.25 and gains.min() < 0.8
     for index, change in enumerate(chosen):
         if change.parts:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cagefield.datasets import load_dataset
-from cagefield.datasets.colmap.colmap_lenses import FACES, PARAMETERS, lens_views
+from cagefield.datasets.colmap.colmap_lenses import PANORAMA_FACES, PARAMETERS, lens_views
 from cagefield.datasets.undistortion import EQUIRECTANGULAR, IDENTITY, SourceLens
 from cagefield.datasets.views import PhotoMask, View
 from cagefield.errors import DatasetError
@@ -232,7 +232,9 @@ def test_faces_of_a_panorama_show_what_their_rays_meet(tmp_path, downscale):
     ):
         data = load_dataset(tmp_path, downscale=downscale)
     assert [len(data.train), len(data.test)] == [7 * 6, 2 * 6]
-    assert {view.name for view in data.test} == {f"pano {i}.{face}.png" for i in (0, 8) for face in FACES}
+    assert {view.name for view in data.test} == {
+        f"pano {i}.{face}.png" for i in (0, 8) for face in PANORAMA_FACES
+    }
     assert {view.image_path for view in data.test}.isdisjoint(view.image_path for view in data.train)
     for view in (*data.train[:6], *data.test[:6]):
         assert view.camera.model == "pinhole" and view.camera.width == view.camera.height
@@ -261,7 +263,7 @@ def test_faces_cover_all_directions_once():
         pixels, depth = camera.project(directions)
         with np.errstate(invalid="ignore"):
             seen += (depth > 0) & ((pixels >= 0) & (pixels <= camera.width)).all(axis=1)
-    assert (seen == 1).all() and FACES["front"] == IDENTITY
+    assert (seen == 1).all() and PANORAMA_FACES["front"] == IDENTITY
 
 
 def test_whole_view_has_the_pixels_of_the_file(tmp_path):

@@ -153,9 +153,9 @@ class Camera:
                 )
             outside = np.any((ij < 0) | (ij >= (self.width, self.height)), axis=1)
             if outside.any():
-                at = int(np.argmax(outside))
+                index = int(np.argmax(outside))
                 raise CameraError(
-                    f"pixels[{at}] = {tuple(ij[at].tolist())} is outside the image of "
+                    f"pixels[{index}] = {tuple(ij[index].tolist())} is outside the image of "
                     f"{self.width}x{self.height}; columns come first, then rows"
                 )
             if self.model == "pinhole":

@@ -110,19 +110,19 @@ class Timeline:
             for name in sorted({name for key in keys for name in key.parts})
         }
 
-    def poses(self, at: Floats) -> Floats:
+    def poses(self, times: Floats) -> Floats:
         """Matrices c2w [N,4,4] at times [N]."""
-        found = np.tile(np.eye(4), (len(at), 1, 1))
-        found[:, :3, :3], found[:, :3, 3] = self._rotation_spline(at).as_matrix(), self._eyes(at)
-        return found
+        poses = np.tile(np.eye(4), (len(times), 1, 1))
+        poses[:, :3, :3], poses[:, :3, 3] = self._rotation_spline(times).as_matrix(), self._eyes(times)
+        return poses
 
-    def fovs_y_deg(self, at: Floats) -> Floats:
+    def fovs_y_deg(self, times: Floats) -> Floats:
         """Vertical fields of view [N] at times [N]."""
-        return np.asarray(self._fovs(at))
+        return np.asarray(self._fovs(times))
 
-    def parts(self, at: Floats) -> dict[int, Floats]:
+    def parts(self, times: Floats) -> dict[int, Floats]:
         """Part [N] at times [N] of each edit that a key has a part of."""
-        return {name: np.clip(curve(at), 0.0, 1.0) for name, curve in self._parts.items()}
+        return {name: np.clip(curve(times), 0.0, 1.0) for name, curve in self._parts.items()}
 
 
 def stills(keys: Sequence[Keyframe], *, loop: bool, fps: float, width: int, height: int) -> tuple[Still, ...]:
@@ -139,8 +139,8 @@ def stills(keys: Sequence[Keyframe], *, loop: bool, fps: float, width: int, heig
     count = max(2, round(timeline.seconds * fps) + (0 if loop else 1))
     if count > 100_000:
         raise CameraError(f"the camera path has {count} pictures; make it shorter or lower its fps")
-    at = np.linspace(0.0, timeline.seconds, count, endpoint=not loop)
-    poses, fovs, parts = timeline.poses(at), timeline.fovs_y_deg(at), timeline.parts(at)
+    times = np.linspace(0.0, timeline.seconds, count, endpoint=not loop)
+    poses, fovs, parts = timeline.poses(times), timeline.fovs_y_deg(times), timeline.parts(times)
     return tuple(
         _still(
             poses[n],

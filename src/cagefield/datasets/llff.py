@@ -206,15 +206,15 @@ def _read_rows(file: Path) -> npt.NDArray[np.float64]:
 
 def _photos(folder: Path, count: int) -> tuple[dict[int, Path], dict[int, list[Path]]]:
     """(photo folders by factor, their photos): the first set that has `count` photos, else the first."""
-    whole = [name for name in FULL_SIZE_FOLDERS if (folder / name).is_dir()]
-    places = [photo_folders(folder, name) for name in whole or [""]]
+    full_size_names = [name for name in FULL_SIZE_FOLDERS if (folder / name).is_dir()]
+    places = [photo_folders(folder, name) for name in full_size_names or [""]]
     if len(photo_files(folder)) == count:
         places.append({1: folder})
-    found = [
+    candidates = [
         (model_folder, {factor: photo_files(images) for factor, images in model_folder.items()})
         for model_folder in places
     ]
-    for model_folder, photos in found:
+    for model_folder, photos in candidates:
         if any(len(files) == count for files in photos.values()):
             return model_folder, photos
-    return found[0]
+    return candidates[0]

@@ -39,7 +39,7 @@ class MaskFolder:
         A mask in the photo's subfolders is preferred, else one in fewer of them where it fits one photo
         alone.
         """
-        found: dict[str, Path] = {}
+        masks: dict[str, Path] = {}
         loose: dict[Path, list[str]] = {}
         for name in dict.fromkeys(names):
             parts = PurePosixPath(name).parts
@@ -54,8 +54,8 @@ class MaskFolder:
             if len(photos) > 1:
                 warn(f"{file}: it fits {len(photos)} photos and is used for none: {join_names(photos)}")
             else:
-                found[photos[0]] = file
-        return found
+                masks[photos[0]] = file
+        return masks
 
     def report_unused(self, used: Iterable[Path]) -> None:
         """Warn once of masks that belong to no photo."""
@@ -71,10 +71,10 @@ def open_mask_folder(folder: Path) -> MaskFolder:
     """Folder of masks that the user names. Raises DatasetError where it is missing or has no masks."""
     if not folder.is_dir():
         raise DatasetError(f"{folder} is no folder; give the folder of the masks, NAME.png for each photo")
-    found = MaskFolder(folder)
-    if not found.files:
+    mask_folder = MaskFolder(folder)
+    if not mask_folder.files:
         raise DatasetError(f"{folder}: no masks in it; name them NAME.png, NAME that of the photo")
-    return found
+    return mask_folder
 
 
 def find_dynamic_mask(photo: Path) -> Path | None:
@@ -103,14 +103,14 @@ def attach_masks(dataset: Dataset, folder: Path | None = None) -> Dataset:
     else:
         given = open_mask_folder(folder.expanduser())
         names = {_photo_name(view): photo for photo, view in views.items()}
-        found = given.find_masks(names)
-        if not found:
+        mask_files = given.find_masks(names)
+        if not mask_files:
             raise DatasetError(
                 f"{folder}: none of its {len(given.files)} masks is of a photo of {dataset.path}; name them "
                 f"NAME.png, {next(iter(names))}.png say"
             )
-        given.report_unused(found.values())
-        masks = {names[name]: PhotoMask(file) for name, file in found.items()}
+        given.report_unused(mask_files.values())
+        masks = {names[name]: PhotoMask(file) for name, file in mask_files.items()}
     if not masks:
         return dataset
     shares = {photo: _excluded_share(photo, mask) for photo, mask in masks.items()}
@@ -161,7 +161,7 @@ def _photo_name(view: View) -> str:
 
 def _masks_beside(path: Path, views: Sequence[View]) -> Mapping[Path, PhotoMask]:
     """Masks by photo, from folders `masks` of the data set and from files beside the photos."""
-    found: dict[Path, PhotoMask] = {}
+    masks: dict[Path, PhotoMask] = {}
     folders: dict[tuple[Path, ...], list[View]] = {}
     candidates: dict[Path, tuple[Path, ...]] = {}
     for view in views:
@@ -174,29 +174,29 @@ def _masks_beside(path: Path, views: Sequence[View]) -> Mapping[Path, PhotoMask]
     for folders_of_masks, group in folders.items():
         for mask_folder in folders_of_masks:
             folder = mask_folders.setdefault(mask_folder, MaskFolder(mask_folder))
-            names = {_photo_name(view): view.image_path for view in group if view.image_path not in found}
+            names = {_photo_name(view): view.image_path for view in group if view.image_path not in masks}
             for name, file in folder.find_masks(names).items():
-                found[names[name]] = PhotoMask(file)
+                masks[names[name]] = PhotoMask(file)
                 used_files.append(file)
     for folder in mask_folders.values():
         if any(file in used_files for file in folder.files.values()):
             folder.report_unused(used_files)
     for view in views:
         beside = find_dynamic_mask(view.image_path)
-        if beside is not None and view.image_path not in found:
-            found[view.image_path] = PhotoMask(beside, "white")
-    return found
+        if beside is not None and view.image_path not in masks:
+            masks[view.image_path] = PhotoMask(beside, "white")
+    return masks
 
 
 def _mask_folders(path: Path, photos: Path) -> list[Path]:
     """Candidate mask folders of a folder of photos: beside it or a folder above it, within the data set."""
-    found: list[Path] = []
+    candidates: list[Path] = []
     base = path if path.is_dir() else path.parent
     for folder in (photos, *photos.parents)[:4]:
         number = re.fullmatch(r"images_([1-9]\d*)", folder.name)
         if number is not None:
-            found.append(folder.with_name(f"masks_{number[1]}"))
-        found.append(folder / "masks")
+            candidates.append(folder.with_name(f"masks_{number[1]}"))
+        candidates.append(folder / "masks")
         if folder == base:
             break
-    return found
+    return candidates

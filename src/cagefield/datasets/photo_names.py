@@ -88,34 +88,34 @@ class FoundPhotos:
 
 def find_photos(base: Path, names: Iterable[str]) -> FoundPhotos:
     """Photo files of `names`, which are relative to the folder `base`."""
-    found, rest = FoundPhotos(), []
+    matches, unmatched = FoundPhotos(), []
     for name in dict.fromkeys(names):
         photo = _find_exact(base, name)
         if photo is None:
-            rest.append(name)
+            unmatched.append(name)
         else:
-            found.photos[name] = photo
-    if not rest:
-        return found
-    taken = {os.path.realpath(photo) for photo in found.photos.values()}
+            matches.photos[name] = photo
+    if not unmatched:
+        return matches
+    taken = {os.path.realpath(photo) for photo in matches.photos.values()}
     tree = _PhotoTree(base)
     claims_by_path: dict[Path, list[tuple[str, bool]]] = defaultdict(list)
-    for name in rest:
+    for name in unmatched:
         candidates, moved = tree.find_similar(name)
         free = [path for path in candidates if os.path.realpath(path) not in taken]
         if len(free) == 1:
             claims_by_path[free[0]].append((name, moved))
         elif free:
-            found.ambiguous.append(name)
+            matches.ambiguous.append(name)
     for path, claims in claims_by_path.items():
         if len({view_name(name) for name, _ in claims}) > 1:
-            found.ambiguous += [name for name, _ in claims]
+            matches.ambiguous += [name for name, _ in claims]
             continue
         for name, moved in claims:
-            found.photos[name] = path
+            matches.photos[name] = path
             if moved:
-                found.moved[name] = path
-    return found
+                matches.moved[name] = path
+    return matches
 
 
 def _find_exact(base: Path, name: str) -> Path | None:
@@ -184,11 +184,11 @@ class _PhotoTree:
         longest = [one for one, length in zip(same_stem, lengths, strict=True) if length == max(lengths)]
         return self._paths(_prefer(longest, parts[-1])), True
 
-    def _paths(self, found: Sequence[tuple[str, ...]]) -> list[Path]:
-        return [self._base.joinpath(*parts) for parts in found]
+    def _paths(self, paths: Sequence[tuple[str, ...]]) -> list[Path]:
+        return [self._base.joinpath(*parts) for parts in paths]
 
 
-def _prefer(found: list[tuple[str, ...]], name: str) -> list[tuple[str, ...]]:
+def _prefer(candidates: list[tuple[str, ...]], name: str) -> list[tuple[str, ...]]:
     """Files with the name's extension if any, and of these the files in no folder of masks or copies."""
     extension = os.path.splitext(name)[1].lower()
     for is_preferred in (
@@ -196,9 +196,9 @@ def _prefer(found: list[tuple[str, ...]], name: str) -> list[tuple[str, ...]]:
         lambda parts: not any(part.lower().startswith(_SECONDARY_FOLDER_PREFIXES) for part in parts[:-1]),
         lambda parts: parts[-1] == name,
     ):
-        preferred = [parts for parts in found if is_preferred(parts)]
-        found = preferred if preferred and len(found) > 1 else found
-    return found
+        preferred = [parts for parts in candidates if is_preferred(parts)]
+        candidates = preferred if preferred and len(candidates) > 1 else candidates
+    return candidates
 
 
 def _common_end(one: Sequence[str], other: Sequence[str]) -> int:

@@ -127,13 +127,17 @@ def _shrunk(pixels: Image.Image, factor: int) -> npt.NDArray[np.uint8]:
     return np.rint(np.concatenate([rgb, alpha], axis=2)).astype(np.uint8)
 
 
-def photo_folders(root: Path, whole: str = "") -> dict[int, Path]:
+def photo_folders(root: Path, full_size_name: str = "") -> dict[int, Path]:
     """Photo folders in `root` by factor: {1: images, 2: images_2, 4: images_4, ...}.
 
-    Full-size photos are in the folder `whole`, or in the first of FULL_SIZE_FOLDERS that exists.
+    Full-size photos are in the folder `full_size_name`, or in the first of FULL_SIZE_FOLDERS that exists.
     """
-    found = [name for name in ((whole,) if whole else FULL_SIZE_FOLDERS) if (root / name).is_dir()]
-    folders = {1: root / found[0]} if found else {}
+    names = [
+        name
+        for name in ((full_size_name,) if full_size_name else FULL_SIZE_FOLDERS)
+        if (root / name).is_dir()
+    ]
+    folders = {1: root / names[0]} if names else {}
     for folder in sorted(root.glob("images_*")):
         if folder.is_dir() and (number := re.fullmatch(r"images_([1-9]\d*)", folder.name)):
             folders[int(number[1])] = folder

@@ -59,7 +59,7 @@ def is_video(path: Path) -> bool:
 def find_raw_photos(folder: Path) -> list[Path]:
     """Photos in a folder and below, in natural order of names, without hidden files and masks."""
     known = {*EXTENSIONS, *RAW_EXTENSIONS}
-    found = [
+    photos = [
         file
         for file in folder.rglob("*")
         if file.suffix.lower() in known
@@ -67,7 +67,7 @@ def find_raw_photos(folder: Path) -> list[Path]:
         and not is_hidden(file.relative_to(folder).parts)
         and not any(MASK_FOLDER_PATTERN.fullmatch(part) for part in file.relative_to(folder).parts[:-1])
     ]
-    return sorted(found, key=lambda file: natural_key(file.relative_to(folder).as_posix()))
+    return sorted(photos, key=lambda file: natural_key(file.relative_to(folder).as_posix()))
 
 
 def write_upright(source: Path, name: str, folder: Path) -> RawPhoto:

@@ -92,9 +92,9 @@ class SourceLens:
         `scale` is the whole photo's width and height in these pixels: shrinking drops left-over rows and
         columns.
         """
-        at = self.positions(camera).reshape(-1, 2)
-        is_inside = np.isfinite(at).all(axis=1)
-        x, y = (at[is_inside].astype(np.float64) * scale - 0.5).T
+        positions = self.positions(camera).reshape(-1, 2)
+        is_inside = np.isfinite(positions).all(axis=1)
+        x, y = (positions[is_inside].astype(np.float64) * scale - 0.5).T
         left, top = np.floor(x).astype(np.intp), np.floor(y).astype(np.intp)
         fraction_x, fraction_y = (x - left)[:, None], (y - top)[:, None]
         source = pixels.astype(np.float32)
@@ -114,7 +114,7 @@ class SourceLens:
         colors = row(top) * (1 - fraction_y) + row(top + 1) * fraction_y
         if source.shape[2] == 4:
             colors[:, :3] *= 255.0 / np.maximum(colors[:, 3:], 1e-6)
-        image = np.zeros((len(at), pixels.shape[2]), np.uint8)
+        image = np.zeros((len(positions), pixels.shape[2]), np.uint8)
         image[is_inside] = np.rint(np.clip(colors, 0, 255)).astype(np.uint8)
         return image.reshape(camera.height, camera.width, -1)
 
@@ -122,10 +122,10 @@ class SourceLens:
         self, valid: BoolArray | None, camera: Camera, scale: tuple[float, float] = (1, 1)
     ) -> BoolArray:
         """Pixels [H,W] of the camera that lie in the photo and whose nearest pixel there is `valid`."""
-        at = self.positions(camera)
-        is_inside = np.array(np.isfinite(at).all(axis=2))
+        positions = self.positions(camera)
+        is_inside = np.array(np.isfinite(positions).all(axis=2))
         if valid is not None:
-            columns, rows = (at[is_inside].astype(np.float64) * scale).astype(np.intp).T
+            columns, rows = (positions[is_inside].astype(np.float64) * scale).astype(np.intp).T
             rows = np.clip(rows, 0, valid.shape[0] - 1)
             is_inside[is_inside] = valid[rows, self._clip_columns(columns, valid.shape[1])]
         return np.asarray(is_inside)

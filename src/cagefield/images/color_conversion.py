@@ -58,10 +58,10 @@ def rgb_converter(image: Image.Image) -> Convert:
         return lambda part: Image.fromarray(srgb_bytes(np.asarray(part))).convert(mode)
     if image.mode == "I" or image.mode.startswith("I;16"):
         return lambda part: _from_16_bits(part).convert(mode)
-    found = _profile_conversion(image)
-    if found is None:
+    conversion = _profile_conversion(image)
+    if conversion is None:
         return lambda part: part.convert(mode)
-    transform, source = found[0], _profiled_mode(image)
+    transform, source = conversion[0], _profiled_mode(image)
 
     def convert(part: Image.Image) -> Image.Image:
         converted = ImageCms.applyTransform(part.convert(source), transform)

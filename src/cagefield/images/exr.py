@@ -143,13 +143,13 @@ def _pixels(part: Any, names: Mapping[str, str], size: tuple[int, int]) -> UInt8
     if any(values.shape != shape for values in channels.values()):
         raise ValueError("its channels have different sizes; it is damaged, or its colors are subsampled")
     alpha = channels.pop("A", None)
-    found = np.zeros((height, width, 3 if alpha is None else 4), np.uint8)
+    pixels = np.zeros((height, width, 3 if alpha is None else 4), np.uint8)
     left, top = max(data[0], window[0]), max(data[1], window[1])
     right, bottom = min(data[2], window[2]), min(data[3], window[3])
     if right <= left or bottom <= top:
-        return found
+        return pixels
     source = np.s_[top - data[1] : bottom - data[1], left - data[0] : right - data[0]]
-    target = found[top - window[1] : bottom - window[1], left - window[0] : right - window[0]]
+    target = pixels[top - window[1] : bottom - window[1], left - window[0] : right - window[0]]
     share = None if alpha is None else alpha[source]
     for index, key in enumerate("RGB" if "R" in channels else "YYY"):
         values = channels[key][source]
@@ -158,4 +158,4 @@ def _pixels(part: Any, names: Mapping[str, str], size: tuple[int, int]) -> UInt8
         target[..., index] = srgb_bytes(values)
     if share is not None:
         target[..., 3] = np.rint(255 * np.clip(np.where(share > 0, share, 0), 0, 1)).astype(np.uint8)
-    return found
+    return pixels

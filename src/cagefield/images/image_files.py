@@ -89,10 +89,12 @@ def open_image_file(path: Path) -> Iterator[Image.Image]:
 
 def load_pixels(image: Image.Image) -> None:
     """Decode an opened image. Raises DECODING_ERRORS, and ValueError where the size is not the header's."""
-    said = image.size
+    header_size = image.size
     image.load()
-    if image.size != said:
-        raise ValueError(f"{image.size[0]} x {image.size[1]} pixels, its header says {said[0]} x {said[1]}")
+    if image.size != header_size:
+        raise ValueError(
+            f"{image.size[0]} x {image.size[1]} pixels, its header says {header_size[0]} x {header_size[1]}"
+        )
 
 
 def iterate_tiles(width: int, height: int, multiple: int = 1) -> Iterator[tuple[int, int, int, int]]:

@@ -44,10 +44,10 @@ def open_decoder(file: BinaryIO) -> Image.Image:
         from cagefield.images.exr import ExrImage
 
         return ExrImage(file, file.name)
-    found = media_brands(start)
-    if any(brand in AVIF_BRANDS for brand in found):
+    brands = media_brands(start)
+    if any(brand in AVIF_BRANDS for brand in brands):
         return _open_avif(file)
-    if any(brand in HEIF_BRANDS for brand in found):
+    if any(brand in HEIF_BRANDS for brand in brands):
         return _open_heif(file)
     try:
         return Image.open(file)

@@ -43,7 +43,7 @@ JPEG_QUALITY = 95
 CAPTURE_FILES = ("images", "transforms.json", "sparse_pc.ply", "colmap", "depth", "distractors")
 """Names of the files and folders of a capture."""
 
-MIN_SIDE_PIXELS = 32
+MIN_PHOTO_SIDE_PIXELS = 32
 
 
 def make_capture(
@@ -75,8 +75,8 @@ def make_capture(
     longer_side = max(plan.phone.width, plan.phone.height) if size is None else size
     if count < 2:
         raise DatasetError(f"views must be at least 2, not {count}")
-    if longer_side < MIN_SIDE_PIXELS:
-        raise DatasetError(f"size must be at least {MIN_SIDE_PIXELS}, not {longer_side}")
+    if longer_side < MIN_PHOTO_SIDE_PIXELS:
+        raise DatasetError(f"size must be at least {MIN_PHOTO_SIDE_PIXELS}, not {longer_side}")
     if depth not in get_args(DepthViews):
         raise DatasetError(f"depth must be one of {', '.join(get_args(DepthViews))}, not {depth!r}")
     target = real_path(out_dir)

@@ -169,10 +169,10 @@ def add_distractors(
         front, _, ahead = alone.shoot(camera.origin, directions)
         first = np.asarray(ahead.t < behind.t)
         mixed = np.where(first[:, None], front, sharp).reshape(len(rows), 4, 3).mean(axis=1)
-        some = np.asarray(first.reshape(-1, 4).any(axis=1)) | nearer[rows, columns]
-        is_distractor[rows, columns] = some
+        has_distractor = np.asarray(first.reshape(-1, 4).any(axis=1)) | nearer[rows, columns]
+        is_distractor[rows, columns] = has_distractor
         # without a ray that meets it, a pixel is as it was
-        image[rows, columns] = np.where(some[:, None], mixed, rgb[rows, columns])
+        image[rows, columns] = np.where(has_distractor[:, None], mixed, rgb[rows, columns])
     return image.astype(np.float32), np.where(nearer, hits.t.reshape(shape), distance), is_distractor
 
 

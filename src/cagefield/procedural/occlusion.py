@@ -65,16 +65,16 @@ class Occlusion:
                 placed = PlacedPrimitive.build(part, primitive)
                 for number, center in enumerate(placed.shift):
                     half = np.abs(placed.linear[number]) @ placed.extent + np.float32(reach)
-                    near = tuple(
+                    box = tuple(
                         slice(*np.searchsorted(axis, (c - h, c + h)))
                         for axis, c, h in zip(axes, center, half, strict=True)
                     )
                     grid = np.meshgrid(
-                        *(axis[cut] for axis, cut in zip(axes, near, strict=True)), indexing="ij"
+                        *(axis[cut] for axis, cut in zip(axes, box, strict=True)), indexing="ij"
                     )
                     points = np.stack(grid).reshape(3, -1).astype(np.float32)
                     distance = placed.distance(points, np.full(points.shape[1], number))
-                    lattice[near] = np.minimum(lattice[near], distance.reshape(grid[0].shape))
+                    lattice[box] = np.minimum(lattice[box], distance.reshape(grid[0].shape))
         return lows.astype(np.float32), lattice
 
     def __call__(self, points: NDArray[np.float32], normals: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -107,6 +107,6 @@ class Occlusion:
     def distance_to_parts(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
         """Distance [N] of points [3,N] to the nearest part, without the enclosing surface, up to `reach`."""
         origin, lattice = self._lattice
-        at = (points - origin[:, None]) / np.float32(self.spacing)
-        distance: NDArray[np.float32] = map_coordinates(lattice, at, order=1, mode="nearest")
+        lattice_positions = (points - origin[:, None]) / np.float32(self.spacing)
+        distance: NDArray[np.float32] = map_coordinates(lattice, lattice_positions, order=1, mode="nearest")
         return distance

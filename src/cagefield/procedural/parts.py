@@ -157,8 +157,8 @@ class PlacedPrimitive:
             return distance * self.scale[instance]
         slope = self.world_gradient(self.local_gradient(local, instance), instance)
         distance = distance / np.maximum(np.linalg.norm(slope, axis=0), np.float32(1e-6))
-        away = np.linalg.norm(points - self.shift.T[:, instance], axis=0) - self.radii[instance]
-        return np.asarray(np.maximum(distance, away), np.float32)
+        ball_distance = np.linalg.norm(points - self.shift.T[:, instance], axis=0) - self.radii[instance]
+        return np.asarray(np.maximum(distance, ball_distance), np.float32)
 
     def local_gradient(self, local: Float32, instance: Int) -> Float32:
         """Gradient [3,N] of the distance in the local frame, by differences over a tetrahedron."""

@@ -135,8 +135,8 @@ class RoomLight:
         low, high = self.occlusion.bounds
         visible_share = np.ones(points.shape[1], np.float32)
         far = np.float32(SHADOW_STEPS[-1])
-        near = np.flatnonzero(((points > low[:, None] - far) & (points < high[:, None] + far)).all(0))
-        points, shadow = points[:, near], visible_share[near]
+        near_rows = np.flatnonzero(((points > low[:, None] - far) & (points < high[:, None] + far)).all(0))
+        points, shadow = points[:, near_rows], visible_share[near_rows]
         toward = self._toward(points)
         reach = np.float32(self.occlusion.reach)
         for step in SHADOW_STEPS:
@@ -144,7 +144,7 @@ class RoomLight:
             distance = self.occlusion.distance_to_parts(points + np.float32(step) * toward)
             share = np.clip(0.5 + 0.5 * distance / half_width, 0, 1)
             np.minimum(shadow, np.where(distance >= 0.99 * reach, 1, share), out=shadow)
-        visible_share[near] = shadow
+        visible_share[near_rows] = shadow
         return np.float32(0.15) + np.float32(0.85) * visible_share * visible_share * (3 - 2 * visible_share)
 
     def _corners(self, points: Float32, normals: Float32) -> Float32:

@@ -212,10 +212,10 @@ class ProceduralScene:
         image = origin - 2 * ((origin - top) @ up) * up
         cosine = up.astype(np.float32) @ directions[:, rows]
         mirrored = directions[:, rows] - 2 * cosine * up.astype(np.float32)[:, None]
-        others = self.placed[:index] + self.placed[index + 1 :]
-        hits_behind = trace(others, image, mirrored, hits.t[rows])
+        other_primitives = self.placed[:index] + self.placed[index + 1 :]
+        hits_behind = trace(other_primitives, image, mirrored, hits.t[rows])
         reflected, _ = self.colors(
-            hits_behind, points_along_rays(image, mirrored, hits_behind.t), mirrored, others
+            hits_behind, points_along_rays(image, mirrored, hits_behind.t), mirrored, other_primitives
         )
         base = np.float32(item.primitive.mirror)
         share = (base + (1 - base) * (1 - np.abs(cosine)) ** 5)[:, None]

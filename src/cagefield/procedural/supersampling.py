@@ -30,15 +30,15 @@ def photograph(shoot: Shoot, camera: Camera, *, supersample: int, background: Ba
     fine = camera if supersample == 1 else camera.resized(width * supersample, height * supersample)
     directions = transform_vectors(camera.c2w[:3, :3], fine.local_directions().T)
     rgb, normals, hits = shoot(camera.origin, directions)
-    seen = np.isfinite(hits.t)
+    is_hit = np.isfinite(hits.t)
 
     def mean(values: NDArray[np.float32]) -> NDArray[np.float32]:
         blocks = values.reshape(height, supersample, width, supersample, -1)
         averaged: NDArray[np.float32] = blocks.mean((1, 3), dtype=np.float32)
         return averaged
 
-    opacity = mean(seen.astype(np.float32))[..., 0]
-    depth = mean(np.where(seen, hits.t, np.float32(0)))[..., 0]
+    opacity = mean(is_hit.astype(np.float32))[..., 0]
+    depth = mean(np.where(is_hit, hits.t, np.float32(0)))[..., 0]
     depth[opacity > 0] /= opacity[opacity > 0]
     depth[opacity == 0] = np.inf
     normal = mean(normals)

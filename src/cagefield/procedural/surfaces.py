@@ -117,8 +117,8 @@ class SurfaceField:
                 part_rows[item.part.name] = np.flatnonzero(((points > low) & (points < high)).all(1))
             rows, instance = _candidates(item, points, part_rows[item.part.name], reach)
             gap = item.distance(np.ascontiguousarray(points[rows].T), instance)
-            near = gap < reach
-            rows, instance, gap = rows[near], instance[near], gap[near]
+            is_near = gap < reach
+            rows, instance, gap = rows[is_near], instance[is_near], gap[is_near]
             before = distance[rows]
             np.minimum.at(distance, rows, gap)
             is_nearest = (distance[rows] == gap) & (gap < before)

@@ -111,8 +111,8 @@ def _trace_primitive(
     t = _march(
         item.primitive.shape, local_origin[:, keep], local_direction[:, keep], enter[keep], leave[keep]
     )
-    found = np.flatnonzero(t < np.inf)
-    ray, instance, t = rays[pair[keep[found]]], instance[keep[found]], t[found]
+    hit_rows = np.flatnonzero(t < np.inf)
+    ray, instance, t = rays[pair[keep[hit_rows]]], instance[keep[hit_rows]], t[hit_rows]
     if len(chosen) > 1:
         np.minimum.at(hits.t, ray, t)
         nearest = hits.t[ray] == t
@@ -122,14 +122,14 @@ def _trace_primitive(
 
 def _march(shape: Shape, origin: Float32, direction: Float32, enter: Float32, leave: Float32) -> Float32:
     """Distances [P] of the first surface on o + t d, o and d [3,P], within [enter, leave]; inf for none."""
-    found = np.full(len(enter), np.inf, np.float32)
+    distances = np.full(len(enter), np.inf, np.float32)
     pace = 1 / np.sqrt((direction**2).sum(0))
     active = np.arange(len(enter))
     t = enter
     for _ in range(MAX_STEPS):
         step = shape.distance(origin + t * direction) * pace
         arrived = step < HIT_TOLERANCE
-        found[active[arrived]] = t[arrived]
+        distances[active[arrived]] = t[arrived]
         t = t + step
         going = np.flatnonzero(~arrived & (t < leave))
         if not len(going):
@@ -137,4 +137,4 @@ def _march(shape: Shape, origin: Float32, direction: Float32, enter: Float32, le
         if len(going) < len(t):
             active, t, leave = active[going], t[going], leave[going]
             origin, direction, pace = origin[:, going], direction[:, going], pace[going]
-    return found
+    return distances

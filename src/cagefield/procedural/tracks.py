@@ -43,7 +43,7 @@ MAX_RELATIVE_DEPTH_ERROR = 0.01
 OBSERVATION_SHARE = 0.6
 """Share of the possible observations that are found."""
 
-MIN_OBSERVATIONS = 3
+MIN_TRACK_OBSERVATIONS = 3
 MAX_POINT_ERROR_PIXELS = 2.5
 """Maximum root mean square distance between a point and its observations."""
 
@@ -97,7 +97,7 @@ def simulate_tracks(
         is_observed &= (rng.uniform(size=is_observed.shape) < OBSERVATION_SHARE) | (
             np.arange(len(cameras)) == index
         )
-        is_observed[is_observed.sum(axis=1) < MIN_OBSERVATIONS] = False
+        is_observed[is_observed.sum(axis=1) < MIN_TRACK_OBSERVATIONS] = False
         pixel_positions += rng.normal(0, OBSERVATION_NOISE_PIXELS, pixel_positions.shape)
         estimates, error = _triangulate(points, is_observed, pixel_positions, cameras)
         good_rows = np.flatnonzero(error <= MAX_POINT_ERROR_PIXELS)
@@ -170,7 +170,7 @@ def _observations(
         values -= values.mean(axis=1, keepdims=True)
         return values / np.maximum(np.linalg.norm(values, axis=1, keepdims=True), 1e-9)
 
-    own = (pixels + 0.5).astype(np.float64)
+    own_pixels = (pixels + 0.5).astype(np.float64)
     model = patches(gray_images[index], (around + 0.5).astype(np.float64))
     origins, directions = cameras[index].rays(around)
     surface = origins + directions * depths[index][around[:, 1], around[:, 0], None]
@@ -180,7 +180,7 @@ def _observations(
     pixel_positions = np.zeros((len(points), len(cameras), 2))
     for view, camera in enumerate(cameras):
         if view == index:
-            is_observed[:, view], pixel_positions[:, view] = True, own
+            is_observed[:, view], pixel_positions[:, view] = True, own_pixels
             continue
         position, ahead = camera.project(points)
         size = (camera.width - PATCH_HALF_WIDTH_PIXELS - 1, camera.height - PATCH_HALF_WIDTH_PIXELS - 1)

@@ -31,7 +31,7 @@ VARIATIONS = {
 PERSON_SHARE, BACKDROP_SHARE, FLASH_SHARE = 0.4, 0.5, 0.5
 """Shares of the training photos."""
 
-MAX_GAIN = 1.5
+MAX_EXPOSURE_GAIN = 1.5
 BALANCE_DEVIATION = 0.08
 """Deviation of the logarithms of the gains of red and of blue."""
 
@@ -83,9 +83,9 @@ def draw_changes(
     if "person" in variations:
         remaining = round(PERSON_SHARE * sum(training))
         for index in rngs["person"].permutation(np.flatnonzero(training)):
-            found = place_person_in_view(scene, cameras[index], rngs["person"]) if remaining else None
-            if found is not None:
-                parts[index].append(found)
+            person = place_person_in_view(scene, cameras[index], rngs["person"]) if remaining else None
+            if person is not None:
+                parts[index].append(person)
                 remaining -= 1
     if "backdrop" in variations:
         for index in _draw_share(training, BACKDROP_SHARE, rngs["backdrop"]):
@@ -93,7 +93,9 @@ def draw_changes(
     flash = set(_draw_share(training, FLASH_SHARE, rngs["flash"])) if "flash" in variations else set()
     gains = np.ones((count, 3), np.float32)
     if "exposure" in variations:
-        gains *= np.exp(rngs["exposure"].uniform(-1, 1, (count, 1)) * np.log(MAX_GAIN)).astype(np.float32)
+        gains *= np.exp(rngs["exposure"].uniform(-1, 1, (count, 1)) * np.log(MAX_EXPOSURE_GAIN)).astype(
+            np.float32
+        )
     if "balance" in variations:
         gains *= np.exp(
             random_walk(rngs["balance"], count, (BALANCE_DEVIATION, 0.0, BALANCE_DEVIATION))

@@ -79,7 +79,7 @@ def check_unchanged(folder: Path, states: States) -> None:
 def is_binary(folder: Path) -> bool:
     """Whether the model in `folder` is read from its binary files, which are preferred to text."""
     files = [folder / f"{name}{ending}" for ending in (".bin", ".txt") for name in ("cameras", "images")]
-    binary, text = (all(file.is_file() for file in files[at : at + 2]) for at in (0, 2))
+    binary, text = (all(file.is_file() for file in files[start : start + 2]) for start in (0, 2))
     return binary or not (text or files[2].is_file())
 
 
@@ -99,8 +99,8 @@ def add_points_file(folder: Path) -> Iterator[Path]:
 
 def _states(folder: Path) -> States:
     """(time of writing in ns, bytes) of each of the model's files that exists."""
-    found = {name: file_state(folder / name) for name in (*_TEXT_FILES, *_RECORDS)}
-    return {name: state for name, state in found.items() if state is not None}
+    states = {name: file_state(folder / name) for name in (*_TEXT_FILES, *_RECORDS)}
+    return {name: state for name, state in states.items() if state is not None}
 
 
 def _check_text(file: Path) -> None:
@@ -132,16 +132,16 @@ class _Window:
 
     def unpack(self, form: str, offset: int) -> Any:
         """Values of the format `form` at a byte. Raises struct.error where the file ends before."""
-        at = self._seek(offset, struct.calcsize(form))
-        return struct.unpack_from(form, self._bytes, at)
+        index = self._seek(offset, struct.calcsize(form))
+        return struct.unpack_from(form, self._bytes, index)
 
     def find(self, byte: bytes, offset: int) -> int:
         """Offset of the first `byte` from `offset` on, -1 where there is none."""
         while True:
-            at = self._seek(offset, 1)
-            found = self._bytes.find(byte, at)
-            if found >= 0:
-                return self._start + found
+            start = self._seek(offset, 1)
+            index = self._bytes.find(byte, start)
+            if index >= 0:
+                return self._start + index
             if not self._bytes:
                 return -1
             offset = self._start + len(self._bytes)

@@ -48,7 +48,7 @@ MAX_PINHOLE_ANGLE = math.radians(60.0)
 fisheyes.
 """
 
-FACES: Final[dict[str, tuple[float, ...]]] = {
+PANORAMA_FACES: Final[dict[str, tuple[float, ...]]] = {
     "front": IDENTITY,
     "right": (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0),
     "back": (-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0),
@@ -141,9 +141,11 @@ def report_resampled(where: str, views: Sequence[LensView]) -> None:
         model_views = [view for view in views if view.source is not None and view.source.model == model]
         if model_views[0].face:
             warn(
-                f"{where}: {len(model_views) // len(FACES)} panoramas are shown as {len(FACES)} "
+                f"{where}: {len(model_views) // len(PANORAMA_FACES)} panoramas are shown as "
+                f"{len(PANORAMA_FACES)} "
                 f"pictures each, "
-                f"{', '.join(FACES)}, of {model_views[0].camera.width}x{model_views[0].camera.height} pixels"
+                f"{', '.join(PANORAMA_FACES)}, of "
+                f"{model_views[0].camera.width}x{model_views[0].camera.height} pixels"
             )
             continue
         share = min(shown_share(view) for view in dict.fromkeys(model_views))
@@ -227,5 +229,5 @@ def _faces(width: int, height: int) -> tuple[LensView, ...]:
     camera = Camera(np.eye(4), side, side, 0.5 * side, 0.5 * side, 0.5 * side, 0.5 * side)
     return tuple(
         LensView(camera, SourceLens(EQUIRECTANGULAR, (), width, height, rotation), face)
-        for face, rotation in FACES.items()
+        for face, rotation in PANORAMA_FACES.items()
     )

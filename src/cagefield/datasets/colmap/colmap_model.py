@@ -31,7 +31,7 @@ from cagefield.files.safe_open import real_path
 
 FloatArray = npt.NDArray[np.float64]
 
-_MAX_NAME_CHARACTERS = 500
+_MAX_IMAGE_NAME_CHARACTERS = 500
 
 MODEL_FILES = ("cameras.bin", "cameras.txt")
 
@@ -84,7 +84,7 @@ def load_colmap(path: Path, downscale: int | None, holdout: int) -> Dataset:
         folders = {1: folders[1]}  # the names of the others count from the old size
     sides = [max(one.camera.width, one.camera.height) for lens in lenses.values() for one in lens]
     factor = choose_downscale(max(sides), downscale, folders)
-    found = {
+    photos_by_factor = {
         stored: find_photos(folders[stored], names)
         for stored in sorted(folders, reverse=True)
         if factor % stored == 0
@@ -93,12 +93,12 @@ def load_colmap(path: Path, downscale: int | None, holdout: int) -> Dataset:
     missing: list[str] = []
     view_names: dict[str, str] = {}
     for image, pose in zip(images, leveling @ poses, strict=True):
-        stored = next((one for one, photos in found.items() if image.name in photos.photos), None)
+        stored = next((one for one, photos in photos_by_factor.items() if image.name in photos.photos), None)
         if stored is None:
             missing.append(image.name)
             continue
-        photo = found[stored].photos[image.name]
-        name = found[stored].relative_view_name(image.name, folders[stored])
+        photo = photos_by_factor[stored].photos[image.name]
+        name = photos_by_factor[stored].relative_view_name(image.name, folders[stored])
         view_names[image.name] = name
         where = f"{model_folder}: image {image.name}"
         try:
@@ -109,7 +109,7 @@ def load_colmap(path: Path, downscale: int | None, holdout: int) -> Dataset:
         except CameraError as error:
             raise DatasetError(f"{where}: {error}") from error
     report_missing(root, sorted(missing), len(images))
-    for stored, photos in found.items():
+    for stored, photos in photos_by_factor.items():
         photos.report(model_folder, folders[stored])
     report_resampled(str(model_folder), [one for image in images for one in lenses[image.camera_id]])
     points = sparse_points(model, view_names, leveling)
@@ -136,8 +136,8 @@ def build_stored_view(
 def _filter_posed(folder: Path, images: Sequence[Any]) -> list[Any]:
     """Images with finite poses; one warning names the others. Raises DatasetError where there are none."""
     posed = [image for image in images if np.isfinite(image_pose(image)).all()]
-    others = [image.name for image in images if not np.isfinite(image_pose(image)).all()]
-    report_unposed(folder, others, len(images))
+    unposed_names = [image.name for image in images if not np.isfinite(image_pose(image)).all()]
+    report_unposed(folder, unposed_names, len(images))
     return posed
 
 
@@ -146,8 +146,8 @@ def _candidate_photo_folders(model_folder: Path, path: Path) -> Iterator[tuple[P
     for folder in _parent_folders(model_folder):
         folder_names = [name for name in FULL_SIZE_FOLDERS if (folder / name).is_dir()]
         for name in folder_names or [""]:
-            if found := photo_folders(folder, name):
-                yield folder, found
+            if factor_folders := photo_folders(folder, name):
+                yield folder, factor_folders
     for folder in _parent_folders(model_folder):
         yield folder, {1: folder}
         if folder in (path, real_path(path)) and folder.name != model_folder.name:
@@ -181,18 +181,18 @@ def sparse_points(model: Any, names: Mapping[str, str], source_to_world: FloatAr
     `names` maps image names to view names; other images are left out of `seen_by`.
     """
     view_names = {number: names[image.name] for number, image in model.images.items() if image.name in names}
-    found = [point for _, point in sorted(model.points3D.items()) if np.isfinite(point.xyz).all()]
-    if not found:
+    finite_points = [point for _, point in sorted(model.points3D.items()) if np.isfinite(point.xyz).all()]
+    if not finite_points:
         return None
-    errors = np.array([point.error for point in found], dtype=np.float32)
+    errors = np.array([point.error for point in finite_points], dtype=np.float32)
     seen_by = tuple(
         frozenset(view_names[e.image_id] for e in point.track.elements if e.image_id in view_names)
-        for point in found
+        for point in finite_points
     )
     return SparsePoints(
-        positions=np.array([point.xyz for point in found]) @ source_to_world[:3, :3].T
+        positions=np.array([point.xyz for point in finite_points]) @ source_to_world[:3, :3].T
         + source_to_world[:3, 3],
-        rgb=np.array([point.color for point in found], dtype=np.uint8),
+        rgb=np.array([point.color for point in finite_points], dtype=np.uint8),
         seen_by=seen_by if any(seen_by) else (),
         errors=np.where(errors >= 0, errors, np.float32(np.nan)),
     )
@@ -240,7 +240,7 @@ def _check_image_names(folder: Path, images: Iterable[Any]) -> None:
     """Raise DatasetError for a name that is too long, UnicodeError for a name whose bytes are no UTF-8."""
     for image in images:
         image.name.encode()
-        if len(image.name) > _MAX_NAME_CHARACTERS:
+        if len(image.name) > _MAX_IMAGE_NAME_CHARACTERS:
             raise DatasetError(
                 f"{folder}: the name of an image has {len(image.name)} characters; export the model again"
             )
@@ -251,12 +251,12 @@ def _parent_folders(folder: Path) -> Sequence[Path]:
 
 
 def _scale_to_photos(
-    where: Path, lenses: dict[int, tuple[LensView, ...]], images: Sequence[Any], found: FoundPhotos
+    where: Path, lenses: dict[int, tuple[LensView, ...]], images: Sequence[Any], photos: FoundPhotos
 ) -> bool:
     """Whether the lenses were scaled, in place, to photos that were scaled down since the model was
     written.
     """
-    headers = [read_header(photo) for photo in found.photos.values()]
+    headers = [read_header(photo) for photo in photos.photos.values()]
     camera_sizes = [lenses[image.camera_id][0].size for image in images]
     size = (
         common_rescaled_size(camera_sizes, [(header.width, header.height) for header in headers])

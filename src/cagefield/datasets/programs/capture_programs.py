@@ -38,9 +38,9 @@ def find_folder_program(folder: Path) -> tuple[Reader, Path] | None:
         (find_reality_capture, load_reality_capture),
         (find_xmp, load_xmp),
     ):
-        found = find(folder)
-        if found is not None:
-            return load, found
+        source = find(folder)
+        if source is not None:
+            return load, source
     return None
 
 

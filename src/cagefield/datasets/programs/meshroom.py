@@ -50,8 +50,8 @@ _RADIAL_COUNTS = {"pinhole": 0, "none": 0, "radial1": 1, "radialk1": 1, "radial3
 def find_meshroom(folder: Path) -> Path | None:
     """Scene file in a folder: one of SCENE_FILES, else the first .sfm; None where there is none."""
     standard_files = [folder / name for name in SCENE_FILES]
-    others = sorted(file for file in folder.glob("*.sfm") if not file.name.startswith("."))
-    return next((file for file in (*standard_files, *others) if file.is_file()), None)
+    other_files = sorted(file for file in folder.glob("*.sfm") if not file.name.startswith("."))
+    return next((file for file in (*standard_files, *other_files) if file.is_file()), None)
 
 
 def is_meshroom(values: dict[str, Any]) -> bool:

@@ -151,15 +151,15 @@ def _has_transform(component: Element | None) -> bool:
 
 def _outer_similarities(file: Path, component: Element | None, chunk: Element) -> list[_Similarity]:
     """Similarities from a component's coordinates to the world, in order of application."""
-    found: list[_Similarity] = []
+    similarities: list[_Similarity] = []
     for where, element in (("component", component), ("chunk", chunk)):
         transform = None if element is None else element.find("transform")
         if transform is None:
             continue
         one = _similarity(f"{file}: transform of the {where}", transform)
-        if not any(_is_equal(one, other) for other in found):  # some exports have one twice
-            found.append(one)
-    return found
+        if not any(_is_equal(one, other) for other in similarities):  # some exports have one twice
+            similarities.append(one)
+    return similarities
 
 
 def _is_equal(one: _Similarity, other: _Similarity) -> bool:
@@ -227,8 +227,11 @@ class _Values:
 
 def _calibration(sensor: Element) -> Element | None:
     """Adjusted calibration of a sensor; the initial one where there is no other."""
-    found = sensor.findall("calibration")
-    return next((one for one in found if one.get("class") == "adjusted"), found[0] if found else None)
+    calibrations = sensor.findall("calibration")
+    return next(
+        (one for one in calibrations if one.get("class") == "adjusted"),
+        calibrations[0] if calibrations else None,
+    )
 
 
 def _size(where: str, sensor: Element, calibration: Element | None) -> tuple[int, int]:

@@ -16,10 +16,10 @@ _MAX_NUMBER_CHARACTERS = 400  # characters of a number
 
 def parse_number(where: str, value: Any) -> float:
     """Finite number of a JSON value or a text. Raises DatasetError, which begins with `where`."""
-    found = _float(value)
-    if found is None or not np.isfinite(found):
+    number = _float(value)
+    if number is None or not np.isfinite(number):
         raise DatasetError(f"{where} must be a finite number, got {value!r:.40}")
-    return found
+    return number
 
 
 def parse_numbers(where: str, values: Any, count: int) -> FloatArray:
@@ -33,18 +33,18 @@ def parse_numbers(where: str, values: Any, count: int) -> FloatArray:
         else values
     )
     if isinstance(parts, list) and len(parts) == count:
-        found = [_float(part) for part in parts]
-        if None not in found:
-            return np.array(found, dtype=np.float64)
+        numbers = [_float(part) for part in parts]
+        if None not in numbers:
+            return np.array(numbers, dtype=np.float64)
     raise DatasetError(f"{where} must be {count} numbers, got {values!r:.80}")
 
 
 def parse_pixel_count(where: str, value: Any) -> int:
     """Whole number of pixels, at least 1. Raises DatasetError, which begins with `where`."""
-    found = parse_number(where, value)
-    if found < 1 or found != int(found):
+    count = parse_number(where, value)
+    if count < 1 or count != int(count):
         raise DatasetError(f"{where} must be a whole number of pixels, got {value!r:.40}")
-    return int(found)
+    return int(count)
 
 
 def _float(value: Any) -> float | None:

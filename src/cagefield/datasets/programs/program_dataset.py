@@ -174,20 +174,22 @@ def _locate_photos(capture: ProgramCapture, frames: Sequence[Frame]) -> list[tup
 
     Raises DatasetError where no photo is there.
     """
-    found = find_photos(capture.photos, [frame.name for frame in frames])
+    matches = find_photos(capture.photos, [frame.name for frame in frames])
     # A name without a folder says nothing about where the photo is.
-    found.moved = {name: path for name, path in found.moved.items() if "/" in view_name(name)}
-    found.report(capture.file, capture.photos)
-    report_missing(capture.file, sorted(f.name for f in frames if f.name not in found.photos), len(frames))
-    _report_unnamed(capture, list(found.photos.values()))
-    names = {name: found.relative_view_name(name, capture.photos) for name in found.photos}
+    matches.moved = {name: path for name, path in matches.moved.items() if "/" in view_name(name)}
+    matches.report(capture.file, capture.photos)
+    report_missing(capture.file, sorted(f.name for f in frames if f.name not in matches.photos), len(frames))
+    _report_unnamed(capture, list(matches.photos.values()))
+    names = {name: matches.relative_view_name(name, capture.photos) for name in matches.photos}
     if capture.points is not None:
-        seen_by = tuple(frozenset(names.get(one, one) for one in seen) for seen in capture.points.seen_by)
+        seen_by = tuple(
+            frozenset(names.get(one, one) for one in view_names) for view_names in capture.points.seen_by
+        )
         capture.points = replace(capture.points, seen_by=seen_by)
     return [
-        (replace(frame, name=names[frame.name]), found.photos[frame.name])
+        (replace(frame, name=names[frame.name]), matches.photos[frame.name])
         for frame in frames
-        if frame.name in found.photos
+        if frame.name in matches.photos
     ]
 
 
@@ -197,15 +199,15 @@ def _report_unnamed(capture: ProgramCapture, used: Sequence[Path]) -> None:
     listed = {
         Path(name.replace("\\", "/")).stem.casefold() for names in capture.left_out.values() for name in names
     }
-    others = []
+    unnamed = []
     for folder in sorted({photo.parent for photo in used}):
         for photo in photo_files(folder):
             if os.path.realpath(photo) not in used_paths and photo.stem.casefold() not in listed:
-                others.append(photo.relative_to(folder).as_posix())
-    if others:
+                unnamed.append(photo.relative_to(folder).as_posix())
+    if unnamed:
         warn(
-            f"{capture.file}: {len(others)} photos beside those it names have no camera in it and are left "
-            f"out: {join_names(others)}"
+            f"{capture.file}: {len(unnamed)} photos beside those it names have no camera in it and are left "
+            f"out: {join_names(unnamed)}"
         )
 
 
@@ -268,5 +270,5 @@ def _transform_points(points: SparsePoints, motion: FloatArray, views: Sequence[
     """Sparse points in the leveled world, with the observations by `views` alone."""
     names = {view.name for view in views}
     positions = points.positions @ motion[:3, :3].T + motion[:3, 3]
-    seen_by = tuple(seen & names for seen in points.seen_by)
+    seen_by = tuple(view_names & names for view_names in points.seen_by)
     return SparsePoints(positions, points.rgb, seen_by if any(seen_by) else (), points.errors)

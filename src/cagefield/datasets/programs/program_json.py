@@ -20,7 +20,7 @@ def read_object(path: Path, max_bytes: int = MOST_TEXT) -> dict[str, Any]:
 
 def read_objects(where: str, values: dict[str, Any], key: str) -> list[dict[str, Any]]:
     """List of objects at a key; empty where there is none. Raises DatasetError for anything else."""
-    found = values.get(key) or []
-    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
+    objects = values.get(key) or []
+    if not isinstance(objects, list) or not all(isinstance(one, dict) for one in objects):
         raise DatasetError(f"{where}: key {key!r} must be a list of objects")
-    return found
+    return objects

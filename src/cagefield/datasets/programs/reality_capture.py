@@ -283,18 +283,18 @@ def _fit_brown_to_division(where: str, k1: float, f: float, width: int, height: 
     corner = 0.5 * float(np.hypot(width, height)) / focal
     radius = _undistort_radius(k1, corner) * np.sqrt(np.linspace(0.0, 1.0, 400)[1:])
     with np.errstate(all="ignore"):
-        wanted = 1.0 / (1.0 + k1 * radius**2) - 1.0
-    if not np.isfinite(wanted).all() or not radius[-1] > 0:
+        target = 1.0 / (1.0 + k1 * radius**2) - 1.0
+    if not np.isfinite(target).all() or not radius[-1] > 0:
         raise DatasetError(f"{where}: its division model (k1 = {k1:g}) makes no sense; export it again")
     powers = (radius / radius[-1])[:, None] ** (2, 4, 6, 8)
-    found = np.linalg.lstsq(powers * radius[:, None], wanted * radius, rcond=None)[0]
-    error = focal * float(np.abs((powers @ found - wanted) * radius).max())
+    coefficients = np.linalg.lstsq(powers * radius[:, None], target * radius, rcond=None)[0]
+    error = focal * float(np.abs((powers @ coefficients - target) * radius).max())
     if not error <= MAX_DIVISION_ERROR_PIXELS:
         raise DatasetError(
             f"{where}: its division model (k1 = {k1:g}) cannot be read, Brown's misses it by "
             f"{error:.2g} pixels; align with a Brown model, or export undistorted photos"
         )
-    return [float(k / radius[-1] ** n) for k, n in zip(found, (2, 4, 6, 8), strict=True)]
+    return [float(k / radius[-1] ** n) for k, n in zip(coefficients, (2, 4, 6, 8), strict=True)]
 
 
 def _undistort_radius(k1: float, distorted: float) -> float:

@@ -32,7 +32,7 @@ MAX_SIDE_PIXELS = 72
 MAX_COMPARED_PHOTOS = 120
 """Maximum number of compared photos, evenly among all."""
 
-MAX_NEIGHBORS = 5
+MAX_COMPARED_NEIGHBORS = 5
 """Maximum number of nearest cameras that each camera is compared with."""
 
 MAX_TURN_RAD = np.radians(20.0)
@@ -172,12 +172,12 @@ def neighbor_pairs(images: Sequence[_SmallImage]) -> list[tuple[int, int]]:
         angle = np.arccos(np.clip(forward @ forward[i], -1.0, 1.0))
         distance = np.linalg.norm(origins - origins[i], axis=1) / image.median_depth
         order = np.argsort(angle / MAX_TURN_RAD + distance / MAX_DISTANCE_DEPTHS, kind="stable")
-        near = [
+        neighbors = [
             j
             for j in order.tolist()
             if j != i and angle[j] < MAX_TURN_RAD and distance[j] < MAX_DISTANCE_DEPTHS
         ]
-        agreeing_share |= {(min(i, j), max(i, j)) for j in near[:MAX_NEIGHBORS]}
+        agreeing_share |= {(min(i, j), max(i, j)) for j in neighbors[:MAX_COMPARED_NEIGHBORS]}
     return sorted(agreeing_share)
 
 

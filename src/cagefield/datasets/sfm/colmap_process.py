@@ -96,7 +96,7 @@ class _Process:
 
     def reason(self) -> str:
         """Reason of the child's end: its own message, else the C++ library's, else its last line."""
-        messages = [found[1] for line in self._last_lines if (found := _EXCEPTION_TEXT.match(line))]
+        messages = [match[1] for line in self._last_lines if (match := _EXCEPTION_TEXT.match(line))]
         return (
             self._failed
             or next(iter(messages), "")

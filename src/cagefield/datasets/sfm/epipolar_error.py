@@ -42,7 +42,7 @@ NEIGHBOR_RANKS = (0, 2, 4)
 SEQUENCE_STEPS = (1, 2)
 """Offsets in the order of names of the photos that each is compared with."""
 
-MIN_INLIERS = 20
+MIN_GEOMETRY_INLIERS = 20
 """Minimum number of matches of one two-view geometry for a pair to count."""
 
 MAX_ANGLE_RATIO = 0.8
@@ -170,10 +170,10 @@ def match_photos(views: Sequence[View], on_progress: OnProgress | None = None) -
         matched_pairs: list[tuple[int, int]] = []
         pixels: list[tuple[FloatArray, FloatArray]] = []
         for number, (i, j) in enumerate(pairs, start=1):
-            found = _match_pair(pycolmap, photos[i], photos[j])
-            if len(found) >= MIN_INLIERS:
+            match_rows = _match_pair(pycolmap, photos[i], photos[j])
+            if len(match_rows) >= MIN_GEOMETRY_INLIERS:
                 matched_pairs.append((i, j))
-                pixels.append((photos[i].features[found[:, 0]], photos[j].features[found[:, 1]]))
+                pixels.append((photos[i].features[match_rows[:, 0]], photos[j].features[match_rows[:, 1]]))
             features.share(on_progress, 0.7, 1.0)(number / len(pairs), f"{number} of {len(pairs)} pairs")
     return PhotoMatches(
         names=tuple(view.name for view in ordered),
@@ -202,7 +202,7 @@ def pose_error(matches: PhotoMatches, views: Sequence[View]) -> PoseError | None
         all_errors.append(error)
         errors[i].append(error)
         errors[j].append(error)
-    measured = [n for n, found in enumerate(errors) if found]
+    measured = [n for n, photo_errors in enumerate(errors) if photo_errors]
     if len(measured) < max(2, MIN_MATCHED_SHARE * len(cameras)):
         return None
     values = np.array([np.quantile(errors[n], PHOTO_QUANTILE) for n in measured])
@@ -289,9 +289,9 @@ def _photo(pycolmap: Any, view: View, extractor: Any) -> _Photo:
         opaque = pixels[..., 3] > 127
         valid = opaque if valid is None else valid & opaque
     if valid is not None and len(positions):
-        at = (positions * (valid.shape[1] / size[0], valid.shape[0] / size[1])).astype(np.intp)
-        at = np.clip(at, 0, (valid.shape[1] - 1, valid.shape[0] - 1))
-        is_used = valid[at[:, 1], at[:, 0]]
+        mask_pixels = (positions * (valid.shape[1] / size[0], valid.shape[0] / size[1])).astype(np.intp)
+        mask_pixels = np.clip(mask_pixels, 0, (valid.shape[1] - 1, valid.shape[0] - 1))
+        is_used = valid[mask_pixels[:, 1], mask_pixels[:, 0]]
     rows = np.asarray(descriptors.data, np.float32)[is_used]
     rows /= np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-9)
     return _Photo(view.camera.resized(*size), positions[is_used], rows)
@@ -300,7 +300,7 @@ def _photo(pycolmap: Any, view: View, extractor: Any) -> _Photo:
 def _match_pair(pycolmap: Any, one: _Photo, other: _Photo) -> npt.NDArray[np.intp]:
     """Rows (i, j) [K,2] of the matches that agree with one two-view geometry."""
     no_matches = np.zeros((0, 2), dtype=np.intp)
-    if min(len(one.features), len(other.features)) < MIN_INLIERS:
+    if min(len(one.features), len(other.features)) < MIN_GEOMETRY_INLIERS:
         return no_matches
     cosines = one.descriptors @ other.descriptors.T
     rows = np.arange(len(cosines))
@@ -310,14 +310,14 @@ def _match_pair(pycolmap: Any, one: _Photo, other: _Photo) -> npt.NDArray[np.int
     second = cosines.max(axis=1)
     ratio = np.arccos(np.clip(nearest, -1.0, 1.0)) < MAX_ANGLE_RATIO * np.arccos(np.clip(second, -1.0, 1.0))
     mutual = np.flatnonzero(ratio & (reverse_best[best] == rows))
-    if len(mutual) < MIN_INLIERS:
+    if len(mutual) < MIN_GEOMETRY_INLIERS:
         return no_matches
     options = pycolmap.TwoViewGeometryOptions(detect_watermark=False)
     options.ransac.random_seed = 0
     options.ransac.max_error = MAX_RANSAC_ERROR_PIXELS
     options.ransac.max_num_trials = MAX_RANSAC_TRIALS
     undistorted = [_undistort_pixels(photo.camera, photo.features) for photo in (one, other)]
-    found = pycolmap.estimate_two_view_geometry(
+    geometry = pycolmap.estimate_two_view_geometry(
         _pinhole(pycolmap, one.camera),
         undistorted[0],
         _pinhole(pycolmap, other.camera),
@@ -325,7 +325,7 @@ def _match_pair(pycolmap: Any, one: _Photo, other: _Photo) -> npt.NDArray[np.int
         np.stack([mutual, best[mutual]], axis=1).astype(np.uint32),
         options,
     )
-    return np.asarray(found.inlier_matches, dtype=np.intp).reshape(-1, 2)
+    return np.asarray(geometry.inlier_matches, dtype=np.intp).reshape(-1, 2)
 
 
 def _undistort_pixels(camera: Camera, pixels: FloatArray) -> FloatArray:

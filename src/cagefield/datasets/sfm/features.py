@@ -262,8 +262,8 @@ def select_likely_pairs(
 def _descriptors(database: Any, image_id: int) -> npt.NDArray[np.float32]:
     if not database.exists_descriptors(image_id):
         return np.zeros((0, 128), dtype=np.float32)
-    found = database.read_descriptors(image_id)
-    rows = np.asarray(getattr(found, "data", found), dtype=np.float32)
+    stored = database.read_descriptors(image_id)
+    rows = np.asarray(getattr(stored, "data", stored), dtype=np.float32)
     if rows.shape[1:] != (128,):
         raise ValueError(f"features of photo {image_id} are {list(rows.shape)} numbers, not 128 each")
     return rows[:2048]

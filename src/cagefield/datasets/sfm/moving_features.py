@@ -35,9 +35,9 @@ agrees.
 MAX_TURN_DEG = 30.0
 """Maximum angle between the viewing directions of a pair whose matches count."""
 
-NEIGHBOR_COUNT = 9
+FEATURE_NEIGHBORS = 9
 NEIGHBOR_SHARE = 0.08
-"""Maximum distance of the NEIGHBOR_COUNT nearest features that decide with one, over the photo's longer side.
+"""Maximum distance of the FEATURE_NEIGHBORS nearest features that decide with one, over the longer side."""
 """
 
 MAX_MOVING_NEIGHBORS = 0.4
@@ -82,7 +82,7 @@ def pair_errors(
 
     `cameras` belong to the registered photos.
     """
-    found = {}
+    errors_by_pair = {}
     min_cosine = np.cos(np.radians(MAX_TURN_DEG))
     for (i, j), rows in matched.matches.items():
         if i not in cameras or j not in cameras or cameras[i].forward @ cameras[j].forward < min_cosine:
@@ -90,8 +90,8 @@ def pair_errors(
         if len(rows):
             pixels = matched.keypoints[i][rows[:, 0]], matched.keypoints[j][rows[:, 1]]
             errors = epipolar_errors(cameras[i], cameras[j], *pixels)
-            found[i, j] = rows, errors / max(cameras[j].width, cameras[j].height)
-    return found
+            errors_by_pair[i, j] = rows, errors / max(cameras[j].width, cameras[j].height)
+    return errors_by_pair
 
 
 def moving_features(matched: MatchedFeatures, cameras: Mapping[int, Camera]) -> tuple[list[Mask], list[int]]:
@@ -109,14 +109,14 @@ def moving_features(matched: MatchedFeatures, cameras: Mapping[int, Camera]) -> 
         contradicts = contradicting_counts[photo] > 0
         matched_rows = np.flatnonzero(contradicts | (agreeing_counts[photo] > 0))
         is_moving = contradicts.copy()
-        if photo in cameras and len(matched_rows) > NEIGHBOR_COUNT:
+        if photo in cameras and len(matched_rows) > FEATURE_NEIGHBORS:
             radius_pixels = NEIGHBOR_SHARE * max(cameras[photo].width, cameras[photo].height)
             distance, rows = cKDTree(points[matched_rows]).query(
-                points, NEIGHBOR_COUNT, distance_upper_bound=radius_pixels
+                points, FEATURE_NEIGHBORS, distance_upper_bound=radius_pixels
             )
-            near = np.isfinite(distance)
-            votes = np.append(contradicts[matched_rows], False)[rows] & near
-            is_moving |= votes.sum(axis=1) > MAX_MOVING_NEIGHBORS * np.maximum(near.sum(axis=1), 1)
+            is_near = np.isfinite(distance)
+            votes = np.append(contradicts[matched_rows], False)[rows] & is_near
+            is_moving |= votes.sum(axis=1) > MAX_MOVING_NEIGHBORS * np.maximum(is_near.sum(axis=1), 1)
             if is_moving[matched_rows].mean() > MIN_MOVING_SHARE:
                 photos.append(photo)
         moving.append(is_moving)

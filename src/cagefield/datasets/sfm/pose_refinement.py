@@ -50,7 +50,7 @@ LAST_BOUND_PIXELS = 3.0
 
 ADJUSTMENT_ROUNDS = 4
 
-MIN_OBSERVATIONS = 15
+MIN_PHOTO_OBSERVATIONS = 15
 """Minimum number of observed points of a photo whose new pose counts."""
 
 MIN_PLACED_SHARE = 0.9
@@ -102,9 +102,9 @@ class PoseSolver:
         triangulation.extract_features(
             self._database, folder, self._names, MAX_ADJUSTMENT_FEATURES, extracting
         )
-        near = triangulation.nearest_pairs([one.camera for one in self._shrunk])
-        in_order = [(i, i + k) for i in range(len(views)) for k in SEQUENCE_STEPS if i + k < len(views)]
-        self._match(sorted({*near, *in_order}), features.share(on_progress, 0.5, 1.0))
+        near_pairs = triangulation.nearest_pairs([one.camera for one in self._shrunk])
+        sequence_pairs = [(i, i + k) for i in range(len(views)) for k in SEQUENCE_STEPS if i + k < len(views)]
+        self._match(sorted({*near_pairs, *sequence_pairs}), features.share(on_progress, 0.5, 1.0))
 
     def refine(self, expected_error: float, on_progress: OnProgress | None = None) -> RefinedPoses | None:
         """Bundle-adjusted cameras; None where too few photos keep enough observations.
@@ -144,11 +144,11 @@ class PoseSolver:
         self._match(pairs, features.share(on_progress, 0.0, 0.5))
         matches = verified_matches(self._database, count)
         mapping = features.share(on_progress, 0.5, 1.0)
-        found = reconstruct(self._folder, self._names, matches, self._seed, mapping)
-        if not found.models:
+        reconstructions = reconstruct(self._folder, self._names, matches, self._seed, mapping)
+        if not reconstructions.models:
             return None
-        refined = self._collect_poses(found.models[0], None)
-        return None if refined is None else replace(refined, moving=len(found.moving))
+        refined = self._collect_poses(reconstructions.models[0], None)
+        return None if refined is None else replace(refined, moving=len(reconstructions.moving))
 
     def _match(self, pairs: features.Pairs, on_progress: OnProgress) -> None:
         match(self._database, self._names, pairs, verify=True, seed=self._seed, on_progress=on_progress)
@@ -156,7 +156,7 @@ class PoseSolver:
     def _collect_poses(self, model: Any, default: Similarity | None) -> RefinedPoses | None:
         """Cameras and points of a reconstruction, aligned to the given poses, else moved by `default`."""
         images = {image_id - 1: model.image(image_id) for image_id in model.reg_image_ids()}
-        placed = [n for n, image in sorted(images.items()) if image.num_points3D >= MIN_OBSERVATIONS]
+        placed = [n for n, image in sorted(images.items()) if image.num_points3D >= MIN_PHOTO_OBSERVATIONS]
         if len(placed) < max(3, MIN_PLACED_SHARE * len(self._views)):
             return None
         poses = np.stack([image_pose(images[n]) for n in placed])

@@ -43,7 +43,7 @@ from cagefield.files.user_cache import cache_root
 Outcome = Literal["unmeasured", "kept", "adjusted", "rebuilt"]
 OnStage = Callable[[str, float, str], None]
 
-MAX_GAIN = 0.7
+MAX_ERROR_RATIO = 0.7
 """Maximum ratio of epipolar errors after and before, for accepting corrected poses that are still called
 wrong.
 """
@@ -54,7 +54,7 @@ MAX_CONTRADICTED = 0.05
 MIN_FOLD_TURN_DEG = 5.0
 """Minimum turn of a tenth of the photos by which new poses differ from the poses of a real fold."""
 
-MAX_SHARED_GAIN = 1.25
+MAX_SHARED_ERROR_RATIO = 1.25
 """Maximum ratio of epipolar errors after and before, where only focal lengths are scattered."""
 
 _VERSION = b"poses 3"
@@ -222,10 +222,10 @@ def _is_better(before: PoseError | None, after: PoseError | None, fold: Fold | N
     if fold is not None and not before.is_wrong:
         return not after.is_wrong
     if not before.is_wrong:
-        return not after.is_wrong and after.median <= MAX_SHARED_GAIN * before.median
+        return not after.is_wrong and after.median <= MAX_SHARED_ERROR_RATIO * before.median
     if not after.is_wrong:
         return after.capped < before.capped
-    return after.median < MAX_GAIN * before.median and after.capped < MAX_GAIN * before.capped
+    return after.median < MAX_ERROR_RATIO * before.median and after.capped < MAX_ERROR_RATIO * before.capped
 
 
 def _agrees(dataset: Dataset, refined: RefinedPoses) -> bool:

@@ -44,8 +44,8 @@ class RawMasks:
         """
         if folder is not None:
             given = open_mask_folder(folder.expanduser())
-            found = given.find_masks(names)
-            if not found:
+            mask_files = given.find_masks(names)
+            if not mask_files:
                 raise DatasetError(
                     f"{folder}: none of its {len(given.files)} masks is of a photo of {base}; name them "
                     f"NAME.png, {names[0]}.png say"
@@ -54,10 +54,12 @@ class RawMasks:
         else:
             beside = [base / "masks", *([base.with_name("masks")] if base.name == "images" else [])]
             folders = [MaskFolder(mask_folder) for mask_folder in beside if mask_folder.is_dir()]
-            found = {}
+            mask_files = {}
             for mask_folder in folders:
-                found = mask_folder.find_masks([name for name in names if name not in found]) | found
-        masks = {name: PhotoMask(file) for name, file in found.items()}
+                mask_files = (
+                    mask_folder.find_masks([name for name in names if name not in mask_files]) | mask_files
+                )
+        masks = {name: PhotoMask(file) for name, file in mask_files.items()}
         if folder is None:
             for name in names:
                 file = find_dynamic_mask(base / name)
@@ -65,7 +67,7 @@ class RawMasks:
                     masks[name] = PhotoMask(file, "white")
         if masks and not quiet:
             for mask_folder in folders:
-                mask_folder.report_unused(found.values())
+                mask_folder.report_unused(mask_files.values())
             warn(
                 f"{base}: {len(masks)} of {len(names)} photos have masks; where they exclude are no features"
             )

@@ -44,13 +44,13 @@ def verified_matches(database: Path, count: int) -> Matches:
 
 
 def explain_unregistered(
-    photos: Sequence[RawPhoto], placed: set[int], others: Sequence[Any], matches: Matches
+    photos: Sequence[RawPhoto], placed: set[int], other_models: Sequence[Any], matches: Matches
 ) -> dict[str, str]:
     """Reason, by name, why each photo that is not in `placed` was not registered."""
     median = float(np.median([photo.sharpness for photo in photos]))
     other_model_sizes = {
         image_id - 1: model.num_reg_images()
-        for model in reversed(others)
+        for model in reversed(other_models)
         for image_id in model.reg_image_ids()
     }
     reasons = {}

@@ -57,29 +57,31 @@ def starting_points(
     "all" is for measuring. Triangulated points are stored in the folder `cache` under a name that depends on
     photos, poses and seed, and read from there again; for None they are triangulated each time.
     """
-    known = training_points(dataset) if views == "train" else dataset.points
-    if known is not None and len(known) >= MIN_STARTING_POINTS:
-        return known
-    used = dataset.train if views == "train" else (*dataset.train, *dataset.test, *_validation_views(dataset))
-    file = None if cache is None else cache / f"points-{capture_key(used, seed)}.npz"
-    found = None if file is None else read_cached_points(file)
-    if found is None:
+    own_points = training_points(dataset) if views == "train" else dataset.points
+    if own_points is not None and len(own_points) >= MIN_STARTING_POINTS:
+        return own_points
+    used_views = (
+        dataset.train if views == "train" else (*dataset.train, *dataset.test, *_validation_views(dataset))
+    )
+    file = None if cache is None else cache / f"points-{capture_key(used_views, seed)}.npz"
+    triangulated = None if file is None else read_cached_points(file)
+    if triangulated is None:
         try:
-            found = triangulate(used, on_progress=on_progress, seed=seed)
+            triangulated = triangulate(used_views, on_progress=on_progress, seed=seed)
         except DatasetError as error:
             warnings.warn(f"{dataset.path}: no points are made of the photos: {error}", stacklevel=2)
             return None
-        if file is not None and found is not None:
-            write_cached_points(file, found)
-    if found is None or len(found) < MIN_STARTING_POINTS:
-        count = 0 if found is None else len(found)
+        if file is not None and triangulated is not None:
+            write_cached_points(file, triangulated)
+    if triangulated is None or len(triangulated) < MIN_STARTING_POINTS:
+        count = 0 if triangulated is None else len(triangulated)
         warnings.warn(
             f"{dataset.path}: the photos give {count} points, too few to start from; poses may be wrong, or "
             "the photos have no texture",
             stacklevel=2,
         )
         return None
-    return found
+    return triangulated
 
 
 def training_points(dataset: Dataset) -> SparsePoints | None:
@@ -90,7 +92,7 @@ def training_points(dataset: Dataset) -> SparsePoints | None:
     if points is None or not points.seen_by:
         return points
     names = {view.name for view in dataset.train}
-    return points.take(np.array([len(seen & names) >= 2 for seen in points.seen_by]))
+    return points.take(np.array([len(view_names & names) >= 2 for view_names in points.seen_by]))
 
 
 def random_points(dataset: Dataset, count: int, seed: int = 0) -> SparsePoints:
@@ -112,10 +114,10 @@ def random_points(dataset: Dataset, count: int, seed: int = 0) -> SparsePoints:
         acceptance = max(accepted_count / tried_count, 1e-3) if tried_count else 0.5
         candidates = _candidates(dataset, min(max(int(1.3 * count / acceptance), 1000), _MAX_CANDIDATES), rng)
         tried_count += len(candidates)
-        seen, rgb = photos.count_views(candidates)
-        is_seen = seen >= min_views
+        view_counts, rgb = photos.count_views(candidates)
+        is_seen = view_counts >= min_views
         if min_views > 1 and not is_seen.any() and attempt == 0:
-            min_views, is_seen = 1, seen >= 1
+            min_views, is_seen = 1, view_counts >= 1
         accepted.append(candidates[is_seen])
         colors.append(rgb[is_seen])
         inside = int(np.count_nonzero(_inside(dataset, candidates[is_seen])))
@@ -179,7 +181,7 @@ class _TrainingPhotos:
         """(number [N] of photos that see each point, 0 where one shows it as empty; mean color [N,3] in
         them).
         """
-        seen = np.zeros(len(points), dtype=np.intp)
+        view_counts = np.zeros(len(points), dtype=np.intp)
         empty = np.zeros(len(points), dtype=bool)
         color_sums = np.zeros((len(points), 3))
         for camera, pixels, valid in self._views:
@@ -192,12 +194,12 @@ class _TrainingPhotos:
             if valid is not None:
                 usable = valid[lines, columns]
                 rows, columns, lines = rows[usable], columns[usable], lines[usable]
-            found = pixels[lines, columns]
-            if found.shape[1] == 4:
-                empty[rows] |= found[:, 3] < _MIN_OPAQUE_ALPHA
-            seen[rows] += 1
-            color_sums[rows] += found[:, :3]
-        return np.where(empty, 0, seen), color_sums / np.maximum(seen, 1)[:, None]
+            point_colors = pixels[lines, columns]
+            if point_colors.shape[1] == 4:
+                empty[rows] |= point_colors[:, 3] < _MIN_OPAQUE_ALPHA
+            view_counts[rows] += 1
+            color_sums[rows] += point_colors[:, :3]
+        return np.where(empty, 0, view_counts), color_sums / np.maximum(view_counts, 1)[:, None]
 
 
 def _validation_views(dataset: Dataset) -> tuple[View, ...]:
@@ -224,9 +226,9 @@ def capture_key(views: Sequence[View], seed: int, version: bytes = _CACHE_VERSIO
 
 def write_cached_points(file: Path, points: SparsePoints) -> None:
     """Write the file whole or not at all; an unwritable folder is ignored."""
-    names = sorted({name for seen in points.seen_by for name in seen})
+    names = sorted({name for view_names in points.seen_by for name in view_names})
     numbers = {name: number for number, name in enumerate(names)}
-    flat = [sorted(numbers[name] for name in seen) for seen in points.seen_by]
+    flat = [sorted(numbers[name] for name in view_names) for view_names in points.seen_by]
     remove_unfinished(file.parent)  # of any name: it has a digest's, that of a run which may not come again
     try:
         with replaced_file(file) as draft, draft.open("wb") as stream:
@@ -236,8 +238,8 @@ def write_cached_points(file: Path, points: SparsePoints) -> None:
                 rgb=points.rgb,
                 errors=np.full(len(points), np.nan) if points.errors is None else points.errors,
                 names=np.array(names, dtype=np.str_),
-                counts=np.array([len(seen) for seen in flat], dtype=np.int64),
-                seen=np.array([number for seen in flat for number in seen], dtype=np.int64),
+                counts=np.array([len(view_names) for view_names in flat], dtype=np.int64),
+                seen=np.array([number for view_names in flat for number in view_names], dtype=np.int64),
             )
     except OSError:
         return
@@ -256,10 +258,10 @@ def read_cached_points(file: Path) -> SparsePoints | None:
         if counts.sum() != len(numbers) or (len(numbers) and numbers.min() < 0):
             return None
         known, flat = names.tolist(), numbers.tolist()
-        seen = tuple(
+        seen_by = tuple(
             frozenset(known[number] for number in flat[end - count : end])
             for count, end in zip(counts.tolist(), np.cumsum(counts).tolist(), strict=True)
         )
-        return SparsePoints(arrays["positions"], arrays["rgb"], seen, arrays["errors"])
+        return SparsePoints(arrays["positions"], arrays["rgb"], seen_by, arrays["errors"])
     except (OSError, ValueError, TypeError, KeyError, IndexError, OverflowError, DatasetError):
         return None

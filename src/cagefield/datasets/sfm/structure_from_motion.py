@@ -164,8 +164,8 @@ def _build(
     )
     match(database, names, pairs, verify=True, seed=seed, on_progress=features.share(on_progress, 0.3, 0.7))
     shared_matches = verified_matches(database, len(photos))
-    found = reconstruct(work, names, shared_matches, seed, features.share(on_progress, 0.7, 0.99))
-    models = found.models
+    reconstructions = reconstruct(work, names, shared_matches, seed, features.share(on_progress, 0.7, 0.99))
+    models = reconstructions.models
     if not models:
         raise DatasetError(f"{source}: {explain_no_model(photos, shared_matches)}")
     model = models[0]
@@ -180,7 +180,7 @@ def _build(
         model.num_points3D(),
         float(model.compute_mean_reprojection_error()),
         left_out,
-        len(found.moving),
+        len(reconstructions.moving),
     )
     _write(model, photos, placed, target, record, report)
     return report
@@ -342,7 +342,7 @@ def _map(
         done = min(placed[0], count)
         on_progress(done / count, f"{done} of {count} photos placed")
 
-    found = features.call(
+    models = features.call(
         pycolmap.incremental_mapping,
         database,
         work / "colmap",
@@ -352,7 +352,7 @@ def _map(
         next_image_callback=count_photo,
         poll=poll,
     )
-    return sorted(found.values(), key=lambda m: (-m.num_reg_images(), -m.num_points3D()))
+    return sorted(models.values(), key=lambda m: (-m.num_reg_images(), -m.num_points3D()))
 
 
 def _write(

@@ -38,7 +38,7 @@ TRIANGULATION_SIDE_PIXELS = 1000
 MAX_ERROR_PIXELS = 4.0
 """Maximum distance of features from epipolar lines and reprojected points, pixels of the shrunk photos."""
 
-MAX_PAIRS = 1000
+MAX_TRIANGULATION_PAIRS = 1000
 """Maximum number of pairs with similar viewing directions; of more, each photo keeps its nearest."""
 
 MIN_NEIGHBORS = 12
@@ -97,7 +97,7 @@ def triangulate(
         to_world = Similarity(scale, np.eye(3), center)
         points = None
         for min_photos in (3, 2):
-            found = triangulate_tracks(
+            triangulated = triangulate_tracks(
                 pycolmap,
                 model,
                 database,
@@ -107,7 +107,7 @@ def triangulate(
                 min_photos=min_photos,
                 seed=seed,
             )
-            points = collect_points(found, shrunk, keypoints, to_world)
+            points = collect_points(triangulated, shrunk, keypoints, to_world)
             if points is not None and len(points) >= MIN_TRIANGULATED_POINTS:
                 break
         features.share(on_progress, 0.0, 1.0)(1.0, f"{0 if points is None else len(points)} points")
@@ -118,9 +118,9 @@ def nearest_pairs(cameras: Sequence[Camera]) -> list[tuple[int, int]]:
     """Pairs (i, j), i < j, of cameras that may overlap: their viewing directions are less than 90 degrees
     apart.
 
-    Where there are more than `MAX_PAIRS`, each camera keeps its nearest, by the angle between the axes over
-    45 degrees plus the distance over the cameras' spread: half of its share in order, and of the following
-    cameras every second, which have more parallax.
+    Where there are more than `MAX_TRIANGULATION_PAIRS`, each camera keeps its nearest, by the angle between
+    the axes over 45 degrees plus the distance over the cameras' spread: half of its share in order, and of
+    the following cameras every second, which have more parallax.
     """
     origins = np.stack([camera.origin for camera in cameras])
     forward = np.stack([camera.forward for camera in cameras])
@@ -130,11 +130,11 @@ def nearest_pairs(cameras: Sequence[Camera]) -> list[tuple[int, int]]:
     is_fisheye = np.array([camera.model == "opencv_fisheye" for camera in cameras])
     allowed = (angle < 90.0) | (is_fisheye[:, None] & is_fisheye[None])
     np.fill_diagonal(allowed, False)
-    if np.count_nonzero(allowed) // 2 <= MAX_PAIRS:
+    if np.count_nonzero(allowed) // 2 <= MAX_TRIANGULATION_PAIRS:
         first, second = np.nonzero(np.triu(allowed))
         return list(zip(first.tolist(), second.tolist(), strict=True))
     score = np.where(allowed, angle / 45.0 + distance, np.inf)
-    count = max(MIN_NEIGHBORS, 2 * MAX_PAIRS // len(cameras))
+    count = max(MIN_NEIGHBORS, 2 * MAX_TRIANGULATION_PAIRS // len(cameras))
     ranks = [*range(count // 2), *range(count // 2, count // 2 + 2 * (count - count // 2), 2)]
     pairs = set()
     for i in range(len(cameras)):
@@ -182,11 +182,11 @@ def _shrink(view: View, folder: Path, name: str, square: bool) -> ShrunkPhoto:
     """Shrunk photo, written to `folder`/colmap; its mask in `folder`/masks where it is a cut-out or
     masked.
     """
-    whole = view.whole()
-    pixels, valid = whole.load(), whole.valid_pixels()
+    full_size = view.whole()
+    pixels, valid = full_size.load(), full_size.valid_pixels()
     height, width = pixels.shape[:2]
     scale = min(1.0, TRIANGULATION_SIDE_PIXELS / max(width, height))
-    aspect = whole.camera.fx / whole.camera.fy if square else 1.0
+    aspect = full_size.camera.fx / full_size.camera.fy if square else 1.0
     size = max(1, round(width * scale)), max(1, round(height * scale * aspect))
     is_valid = np.ones((height, width), bool) if valid is None else valid
     if pixels.shape[2] == 4:
@@ -202,7 +202,7 @@ def _shrink(view: View, folder: Path, name: str, square: bool) -> ShrunkPhoto:
     if image.size != size:
         image = image.resize(size, Image.Resampling.BOX)
     image.save(folder / "colmap" / name, compress_level=1)
-    return ShrunkPhoto(view, whole.camera.resized(*size), size[0] / width, np.asarray(image))
+    return ShrunkPhoto(view, full_size.camera.resized(*size), size[0] / width, np.asarray(image))
 
 
 def normalization(cameras: Sequence[Camera]) -> tuple[FloatArray, float]:
@@ -233,17 +233,17 @@ def _allow_matches(pycolmap: Any, path: Path, shrunk: Sequence[ShrunkPhoto]) -> 
     with features.opened(path) as database:
         for index, one in enumerate(shrunk, start=1):
             camera = one.camera
-            found = (
+            pixels = (
                 np.asarray(database.read_keypoints(index), dtype=np.float64)[:, :2]
                 if database.exists_keypoints(index)
                 else np.zeros((0, 2))
             )
-            image = (found - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
-            local, seen = lenses.unproject(image, camera.model, camera.distortion)
+            image = (pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+            local, is_visible = lenses.unproject(image, camera.model, camera.distortion)
             world = local * _OPENGL_TO_OPENCV @ camera.c2w[:3, :3].T
-            directions.append(np.where(seen[:, None], world, np.nan))
-            keypoints.append(found)
-            if camera.model == "opencv" and len(found):
+            directions.append(np.where(is_visible[:, None], world, np.nan))
+            keypoints.append(pixels)
+            if camera.model == "opencv" and len(pixels):
                 undistorted = local[:, :2] / local[:, 2:] * (camera.fx, camera.fy) + (camera.cx, camera.cy)
                 database.update_keypoints(index, undistorted.astype(np.float32))
         for pair, matches in zip(*database.read_all_matches(), strict=True):
@@ -354,17 +354,17 @@ def collect_points(
     """
     positions, rgb, seen_by, errors = [], [], [], []
     for _, point in sorted(model.points3D.items()):
-        seen = {element.image_id - 1: element.point2D_idx for element in point.track.elements}
-        if len(seen) < 2 or not np.isfinite(point.xyz).all() or np.abs(point.xyz).max() > 1e4:
+        feature_rows = {element.image_id - 1: element.point2D_idx for element in point.track.elements}
+        if len(feature_rows) < 2 or not np.isfinite(point.xyz).all() or np.abs(point.xyz).max() > 1e4:
             continue
         colors = []
-        for photo, row in seen.items():
-            at = model.image(photo + 1).point2D(row).xy if keypoints is None else keypoints[photo][row]
-            colors.append(_pixel(shrunk[photo].pixels, at))
+        for photo, row in feature_rows.items():
+            pixel = model.image(photo + 1).point2D(row).xy if keypoints is None else keypoints[photo][row]
+            colors.append(_pixel(shrunk[photo].pixels, pixel))
         positions.append(np.asarray(point.xyz))
         rgb.append(np.rint(np.mean(colors, axis=0)))
-        seen_by.append(frozenset(shrunk[photo].view.name for photo in seen))
-        errors.append(point.error / np.mean([shrunk[photo].scale for photo in seen]))
+        seen_by.append(frozenset(shrunk[photo].view.name for photo in feature_rows))
+        errors.append(point.error / np.mean([shrunk[photo].scale for photo in feature_rows]))
     if not positions:
         return None
     return SparsePoints(

@@ -18,7 +18,7 @@ from cagefield.files.safe_open import MOST_TEXT, read_bytes
 
 FloatArray = npt.NDArray[np.float64]
 
-_BYTE_ORDER_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+_UTF16_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 # A pattern without an end is taken to the end of the text, so that each character is looked at once.
 _STRING = r'"[^"\\]*(?:\\.[^"\\]*)*(?:"|\Z)'
 _COMMENT_PATTERN = re.compile(_STRING + r"|//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
@@ -37,7 +37,7 @@ def read_json(
     """
     try:
         content = read_bytes(path, max_bytes)
-        text = content.decode(_BYTE_ORDER_MARKS.get(content[:2], "utf-8-sig"))
+        text = content.decode(_UTF16_MARKS.get(content[:2], "utf-8-sig"))
         try:
             values = json_text.loads(text, finite=False)
         except json.JSONDecodeError:
@@ -61,13 +61,16 @@ def _to_strict_json(text: str) -> str:
 
 def _blank_matches(pattern: re.Pattern[str], text: str) -> str:
     """Text with spaces in place of the pattern's matches outside of strings; line breaks stay."""
-    parts, at = list[str](), 0
-    for found in pattern.finditer(text):
-        begin, end = found.span()
+    parts, copied_to = list[str](), 0
+    for match in pattern.finditer(text):
+        begin, end = match.span()
         if text[begin] != '"':
-            parts += [text[at:begin], "\n".join(" " * len(line) for line in text[begin:end].split("\n"))]
-            at = end
-    return "".join([*parts, text[at:]])
+            parts += [
+                text[copied_to:begin],
+                "\n".join(" " * len(line) for line in text[begin:end].split("\n")),
+            ]
+            copied_to = end
+    return "".join([*parts, text[copied_to:]])
 
 
 def read_number(where: str, source: dict[str, Any], key: str) -> float | None:
@@ -78,28 +81,28 @@ def read_number(where: str, source: dict[str, Any], key: str) -> float | None:
     value = source.get(key)
     if value is None:
         return None
-    found = math.nan
+    result = math.nan
     if isinstance(value, (int, float, str)) and not isinstance(value, bool):
         try:
-            found = float(value)
+            result = float(value)
         except ValueError:
-            found = math.nan
-    if not math.isfinite(found):
+            result = math.nan
+    if not math.isfinite(result):
         raise DatasetError(f"{where}: key {key!r} must be a finite number, got {value!r:.40}")
-    return found
+    return result
 
 
 def read_matrix(where: str, value: Any) -> FloatArray:
     """Matrix [4,4] of 3 or 4 rows; its entries may be text, and need not be finite."""
     try:
-        found = np.array(value, dtype=np.float64)
+        result = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
-        found = np.empty(0)
-    if found.shape == (3, 4):
-        found = np.concatenate([found, [[0.0, 0.0, 0.0, 1.0]]])
-    if found.shape != (4, 4):
+        result = np.empty(0)
+    if result.shape == (3, 4):
+        result = np.concatenate([result, [[0.0, 0.0, 0.0, 1.0]]])
+    if result.shape != (4, 4):
         raise DatasetError(f"{where} must be 4 rows (or 3) of 4 numbers")
-    return found
+    return result
 
 
 def remove_scale(pose: FloatArray) -> tuple[FloatArray, float]:

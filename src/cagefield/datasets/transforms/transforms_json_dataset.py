@@ -115,7 +115,9 @@ def load_transforms(path: Path, downscale: int | None, holdout: int) -> Dataset:
     unbounded, bounds = _bounds(
         main_file, [view.camera for view in views["train"]], cut_out, synthetic, points
     )
-    found = None if points is None else depths_of_points([v.camera for v in all_views], points.positions)
+    point_depths = (
+        None if points is None else depths_of_points([v.camera for v in all_views], points.positions)
+    )
     dataset = Dataset(
         name=real_path(folder).name,
         path=folder,
@@ -126,7 +128,9 @@ def load_transforms(path: Path, downscale: int | None, holdout: int) -> Dataset:
         bounds=bounds,
         white_background=cut_out,
         source_to_world=main_file.source_to_world(),
-        depths=None if found is None else (float(found[:, 0].min()), float(found[:, 1].max())),
+        depths=None
+        if point_depths is None
+        else (float(point_depths[:, 0].min()), float(point_depths[:, 1].max())),
         points=points,
     )
     return move_near_origin(dataset)
@@ -148,13 +152,13 @@ def _read_views(where: Path, folder: Path, files: Sequence[_TransformsFile]) -> 
     photos.report(where, folder)
     report_unposed(where, gather("unposed"), total)
     missing_masks = list(dict.fromkeys(masks.ambiguous + gather("without_mask")))
-    for found, note in (
+    for affected, note in (
         (gather("unnamed"), "frames are left out, they have no file_path"),
         (gather("repeated"), "frames are left out, their photos are listed before"),
         (missing_masks, "masks are not used, their files are missing"),
     ):
-        if found:
-            warn(f"{where}: {len(found)} {note}: {join_names(found)}")
+        if affected:
+            warn(f"{where}: {len(affected)} {note}: {join_names(affected)}")
     report_resampled(str(where), [lens for file in files for lens in file.lenses])
     scales = [scale for file in files for scale in file.scales]
     if scales:
@@ -267,20 +271,20 @@ class _TransformsFile:
         """
         headers = [read_header(photo) for _, photo, _ in read]
         camera_sizes = [lens.size for _, _, lens in read]
-        found = [(header.width, header.height) for header in headers]
-        if camera_sizes == found:
+        photo_sizes = [(header.width, header.height) for header in headers]
+        if camera_sizes == photo_sizes:
             return None
-        size = common_rescaled_size(camera_sizes, found)
+        size = common_rescaled_size(camera_sizes, photo_sizes)
         if size is None:
-            index = next(i for i in range(len(camera_sizes)) if camera_sizes[i] != found[i])
+            index = next(i for i in range(len(camera_sizes)) if camera_sizes[i] != photo_sizes[i])
             key, value = (
                 ("w", camera_sizes[index][0])
-                if camera_sizes[index][0] != found[index][0]
+                if camera_sizes[index][0] != photo_sizes[index][0]
                 else ("h", camera_sizes[index][1])
             )
             raise DatasetError(
                 f"{self.path}: frame {read[index][0]}: key {key!r} is {value}, but "
-                f"{read[index][1]} is {found[index][0]}x{found[index][1]}; use the photos that "
+                f"{read[index][1]} is {photo_sizes[index][0]}x{photo_sizes[index][1]}; use the photos that "
                 "the intrinsics belong to, or scale w, h, fl_x, fl_y, cx and cy to these"
             )
         warn_of_scaling(str(self.path), camera_sizes[0], size)
@@ -322,25 +326,25 @@ class _TransformsFile:
         if not isinstance(name, str) or not name:
             raise DatasetError(f"{self.path}: key 'ply_file_path' must name a PLY file, got {name!r:.80}")
         try:
-            found = read_points(self.path.parent / view_name(name))
+            points = read_points(self.path.parent / view_name(name))
         except DatasetError as error:
             warn(f"{error}; {self.path} is used without its points")
             return None
-        return found if len(found) else None
+        return points if len(points) else None
 
     def source_to_world(self) -> npt.NDArray[np.float64]:
         """Matrix [4,4] of nerfstudio's `applied_scale` x `applied_transform`; the identity without them."""
         where = str(self.path)
-        found = np.eye(4)
+        transform = np.eye(4)
         if self.values.get("applied_transform") is not None:
-            found = read_matrix(f"{where}: key 'applied_transform'", self.values["applied_transform"])
+            transform = read_matrix(f"{where}: key 'applied_transform'", self.values["applied_transform"])
         scale = read_number(where, self.values, "applied_scale")
         if scale is not None and scale <= 0:
             raise DatasetError(f"{where}: key 'applied_scale' must be positive, got {scale:g}")
-        if not np.isfinite(found).all() or abs(np.linalg.det(found)) < 1e-12:
+        if not np.isfinite(transform).all() or abs(np.linalg.det(transform)) < 1e-12:
             raise DatasetError(f"{where}: key 'applied_transform' must be finite and invertible")
-        found[:3] *= 1.0 if scale is None else scale
-        return found
+        transform[:3] *= 1.0 if scale is None else scale
+        return transform
 
 
 def _are_cut_outs(views: list[View]) -> bool:

@@ -116,7 +116,7 @@ def _focal_lengths(
     where: str, source: dict[str, Any], width: int, height: int
 ) -> tuple[float | None, float | None]:
     """Focal lengths in pixels along x and y as far as `source` gives them."""
-    found: list[float | None] = []
+    focals: list[float | None] = []
     for axis, side in (("x", width), ("y", height)):
         focal = read_number(where, source, f"fl_{axis}")
         if focal is None:
@@ -131,5 +131,5 @@ def _focal_lengths(
                         f"must lie between 0 and 180 (radians in camera_angle_{axis}, degrees in {axis}_fov)"
                     )
                 focal = 0.5 * side / math.tan(0.5 * angle)
-        found.append(focal)
-    return found[0], found[1]
+        focals.append(focal)
+    return focals[0], focals[1]
