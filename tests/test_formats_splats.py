@@ -158,9 +158,9 @@ def test_a_spool_sorts_as_memory_does(tmp_path: Path, monkeypatch: pytest.Monkey
     source = splat_table.SplatSource(tmp_path, 1000, 0, "rdf", table.batches)
     with splat_table.spool_splats(source, table.batches(), 0, lambda _: None) as spool:
         for _ in range(2):
-            sorted_ = np.concatenate([batch.rows() for batch in spool.sorted_batches()])
+            sorted_ = np.concatenate([batch.to_rows() for batch in spool.sorted_batches()])
             np.testing.assert_array_equal(
-                sorted_, np.concatenate([batch.rows() for batch in table.sorted_batches()])
+                sorted_, np.concatenate([batch.to_rows() for batch in table.sorted_batches()])
             )
 
 

@@ -38,7 +38,6 @@ MAX_TURN_DEG = 30.0
 FEATURE_NEIGHBORS = 9
 NEIGHBOR_SHARE = 0.08
 """Maximum distance of the FEATURE_NEIGHBORS nearest features that decide with one, over the longer side."""
-"""
 
 MAX_MOVING_NEIGHBORS = 0.4
 """Maximum share of moving neighbors of a feature that counts as static."""
