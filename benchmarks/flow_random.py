@@ -143,7 +143,7 @@ def random_operation(rng: np.random.Generator) -> Operation:
     if kind == 1:
         axis = rng.normal(size=3)
         turn = rng.choice([1.0, rng.random()]) * np.pi * axis / np.linalg.norm(axis)
-        return Rotate.from_radians(Rotation.from_rotvec(turn).as_euler("XYZ"))
+        return Rotate.from_rotation(Rotation.from_rotvec(turn).as_euler("XYZ"))
     if kind == 2:
         return Scale.of(rng.choice([0.3, 3.0, float(np.exp(x))], 3 if rng.random() < 0.5 else None))
     if kind == 3:

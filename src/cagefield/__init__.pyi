@@ -2,6 +2,7 @@ __version__: str
 
 from .cameras.camera import Camera as Camera
 from .cameras.camera import turntable as turntable
+from .cameras.camera_paths import CameraPath as CameraPath
 from .datasets.dataset_loader import load_dataset as load_dataset
 from .datasets.views import Dataset as Dataset
 from .edits.edit import Edit as Edit
@@ -14,8 +15,14 @@ from .fields.nerf_field import NerfField as NerfField
 from .fields.protocol import Field as Field
 from .fields.splat_field import SplatField as SplatField
 from .fields.voxel_field import VoxelField as VoxelField
+from .formats.splats.splat_files import read_splats as read_splats
+from .formats.splats.splat_files import write_splats as write_splats
 from .geometry.cage import Cage as Cage
 from .images.render_result import RenderResult as RenderResult
 from .rendering.reference_renderer import render_sampled as render_sampled
+from .rendering.splats.splat_renderer import SplatRenderer as SplatRenderer
 from .rendering.voxels.voxel_renderer import Renderer as Renderer
 from .scene.scene import Scene as Scene
+from .training.nerf.train_nerf import train_nerf as train_nerf
+from .training.splats.train_splats import train_splat as train_splat
+from .training.voxels.train_voxels import train_voxel as train_voxel

@@ -84,6 +84,43 @@ class Camera:
         return cls(cast(FloatArray, c2w), width, height, focal, focal, 0.5 * width, 0.5 * height)
 
     @classmethod
+    def from_opencv(
+        cls,
+        viewmat: npt.ArrayLike,
+        K: npt.ArrayLike,
+        width: int,
+        height: int,
+        *,
+        model: Lens = "pinhole",
+        distortion: Sequence[float] = (),
+    ) -> Camera:
+        """Camera from a world-to-camera matrix [4,4] in OpenCV axes and intrinsics K [3,3] in pixels.
+
+        The convention of COLMAP and gsplat (+x right, +y down, +z forward); the principal point of K counts
+        from the corner of the first pixel, whose center is at (.5, .5). Inverse of `viewmat` and `K`.
+
+        Raises CameraError for other shapes, a pose that is not rigid, and a K with skew or another last row.
+        """
+        pose, intrinsics = (np.asarray(matrix, dtype=np.float64) for matrix in (viewmat, K))
+        if pose.shape != (4, 4):
+            raise CameraError(f"viewmat must have the shape [4,4], got {list(pose.shape)}")
+        if intrinsics.shape != (3, 3):
+            raise CameraError(f"K must have the shape [3,3], got {list(intrinsics.shape)}")
+        rest = intrinsics - np.diag(np.diag(intrinsics))
+        rest[:2, 2] = 0.0
+        if np.any(rest != 0.0) or intrinsics[2, 2] != 1.0:
+            raise CameraError(
+                f"K must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], got {intrinsics.tolist()}; "
+                "skew is not supported, undistort the photos"
+            )
+        rotation = validate_pose(pose)[:3, :3]
+        c2w = np.eye(4)
+        c2w[:3, :3] = rotation.T * _OPENGL_TO_OPENCV
+        c2w[:3, 3] = -rotation.T @ pose[:3, 3]
+        (fx, _, cx), (_, fy, cy), _ = intrinsics.tolist()
+        return cls(c2w, width, height, fx, fy, cx, cy, model, tuple(distortion))
+
+    @classmethod
     def look_at(
         cls,
         eye: npt.ArrayLike,
@@ -120,6 +157,20 @@ class Camera:
     def origin(self) -> FloatArray:
         """Position [3] of the camera in the world."""
         return self.c2w[:3, 3]
+
+    @property
+    def K(self) -> FloatArray:
+        """Intrinsics [3,3] in pixels: [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def viewmat(self) -> FloatArray:
+        """World-to-camera matrix [4,4] in OpenCV axes (+x right, +y down, +z forward), as in gsplat."""
+        rotation = (self.c2w[:3, :3] * _OPENGL_TO_OPENCV).T
+        viewmat = np.eye(4)
+        viewmat[:3, :3] = rotation
+        viewmat[:3, 3] = -rotation @ self.origin
+        return viewmat
 
     @property
     def forward(self) -> FloatArray:

@@ -153,7 +153,7 @@ class Edit:
 
     def rotate(self, theta: ArrayLike, *, axes: Axes = "world") -> Edit:
         """The edit with its inner cage turned about its pivot, intrinsic XYZ angles [3] in radians."""
-        return self.then(ops.Rotate.from_radians(theta, axes))
+        return self.then(ops.Rotate.from_rotation(theta, axes))
 
     def scale(self, by: ArrayLike, *, axes: Axes = "world") -> Edit:
         """The edit with its inner cage scaled about its pivot by one factor or three."""

@@ -48,9 +48,15 @@ class Rotate:
     noun: ClassVar[str] = "rotation"
 
     @classmethod
-    def from_radians(cls, theta: ArrayLike, axes: Axes = "world") -> Rotate:
-        """The same from radians; angles within rounding of a short decimal number of degrees become it."""
-        degrees = np.degrees(vector(theta, "rotate"))
+    def from_rotation(cls, rotation: Rotation | ArrayLike, axes: Axes = "world") -> Rotate:
+        """Rotation from a SciPy `Rotation`, or from intrinsic XYZ angles [3] in radians.
+
+        Angles within rounding of a short decimal number of degrees become that number.
+        """
+        if isinstance(rotation, Rotation):
+            degrees = vector(euler_degrees(rotation), "rotate")
+        else:
+            degrees = np.degrees(vector(rotation, "rotate"))
         short = np.round(degrees, 9)
         near = np.abs(degrees - short) <= 4e-16 * np.abs(degrees)
         return cls(_triple(np.where(near, short, degrees)), axes)

@@ -128,6 +128,32 @@ class SplatField:
     def __len__(self) -> int:
         return len(self.means)
 
+    @classmethod
+    def from_gsplat(
+        cls, means: ArrayLike, quats: ArrayLike, scales: ArrayLike, opacities: ArrayLike, sh: ArrayLike
+    ) -> SplatField:
+        """SplatField from the arguments of `gsplat.rasterization`, after their activations.
+
+        means [N,3]; quats [N,4] (w, x, y, z); scales [N,3], standard deviations > 0; opacities [N] in [0, 1];
+        sh [N, (degree+1)^2, 3], the `colors` of a call with `sh_degree`. Tensors on the CPU are arrays here.
+
+        Raises FieldError for scales that are not positive, and as the class.
+        """
+        widths = np.asarray(scales, dtype=np.float32)
+        if not (widths > 0.0).all():
+            raise FieldError(
+                f"scales must be positive standard deviations, got {widths.min():g}; apply exp to gsplat's "
+                "trained parameters"
+            )
+        as_float32 = (np.asarray(value, dtype=np.float32) for value in (means, quats, opacities, sh))
+        positions, quaternions, opacity, harmonics = as_float32
+        return cls(positions, np.log(widths), quaternions, opacity, harmonics)
+
+    @property
+    def scales(self) -> Float32:
+        """Standard deviations [N,3] float32 along the splats' axes, world units."""
+        return np.exp(self.log_scales)
+
     @property
     def sh_degree(self) -> int:
         """Degree of the color's spherical harmonics, 0 to `sh.MAX_DEGREE`."""

@@ -163,13 +163,16 @@ class Cage:
         v = vector(by, "translate")
         return Cage(self.corners + v, pivot=self.pivot + v)
 
-    def rotate(self, theta: ArrayLike, *, axes: Axes = "world") -> Cage:
-        """The cage turned about its pivot by R_x R_y R_z, intrinsic XYZ angles [3] in radians.
+    def rotate(self, rotation: Rotation | ArrayLike, *, axes: Axes = "world") -> Cage:
+        """The cage turned about its pivot by a SciPy `Rotation`, or by intrinsic XYZ angles [3] in radians.
 
-        As `scipy.spatial.transform.Rotation.from_euler("XYZ")`. axes="cage" turns about the cage's own x, y
-        and z directions instead of the world's.
+        Angles give R_x R_y R_z, as `Rotation.from_euler("XYZ", angles)`. axes="cage" turns about the cage's
+        own x, y and z directions instead of the world's.
         """
-        R = rotation_matrix(vector(theta, "rotate"))
+        if isinstance(rotation, Rotation):
+            R = read_only(rotation.as_matrix(), (3, 3), "rotate")
+        else:
+            R = rotation_matrix(vector(rotation, "rotate"))
         if axes == "cage":
             R = self.heading @ R @ self.heading.T
         return self._linear(R, axes)
