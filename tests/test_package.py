@@ -49,7 +49,7 @@ RUNTIMES = {
 """Compute runtimes, servers, command lines and readers of images and poses."""
 
 NEEDS_IMAGES = {"Dataset", "load_dataset", "read_splats", "train_splat", "train_voxel", "write_splats"}
-"""Exports that read images or photos, and import Pillow."""
+"""Exports that read images, photos or splat files, and import Pillow or zstandard (SPZ)."""
 
 NEEDS_KERNELS = {"SplatRenderer", "train_nerf"}
 """Exports that import a compute runtime: Numba for splats, PyTorch and Quadrants for NeRFs."""
@@ -74,9 +74,9 @@ def test_mathematics_imports_no_runtime() -> None:
     assert sorted(loaded & RUNTIMES) == []
 
 
-def test_names_about_photos_import_pillow_alone() -> None:
+def test_names_about_files_import_their_decoders_alone() -> None:
     code = "\n".join(["import cagefield", *(f"cagefield.{name}" for name in sorted(NEEDS_IMAGES))])
-    assert loaded_packages(code) & RUNTIMES == {"PIL"}
+    assert loaded_packages(code) & RUNTIMES == {"PIL", "zstandard"}
 
 
 def test_a_map_of_points_needs_no_runtime() -> None:
