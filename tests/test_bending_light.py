@@ -82,7 +82,7 @@ def test_light_changes_matter_only_right_under_what_is_lifted_and_far_things_kee
     assert np.abs(where[:, :2] - [0.1, 0.0]).max() < 0.4
     assert np.abs(where[:, 2] - FLOOR).max() < 5.0 * plain.spacing[2]
     both = (block.slot >= 0) & (plain.slot >= 0)
-    moved = np.abs(block.colours(both) - plain.colours(both)).max(axis=1)
+    moved = np.abs(block.mean_colors(both) - plain.mean_colors(both)).max(axis=1)
     away = np.linalg.norm(plain.positions(both)[:, :2] - [0.1, 0.0], axis=1)
     assert moved.max() > 0.1 and moved[away > 0.25 * np.sqrt(2.0) + 1.3 * REACH].max() < 0.01
 
@@ -110,7 +110,7 @@ def test_what_was_hidden_under_what_is_lifted_is_ground():
     top.reshape(-1)[
         field.vertices[under & (np.abs(where[:, 2] - FLOOR + 1.0 / VERTICES) < 1.0 / VERTICES)]
     ] = True
-    known = block.colours(top & (block.slot >= 0))
+    known = block.mean_colors(top & (block.slot >= 0))
     assert len(known) > 50 and known.std() < 0.05 and abs(known.mean() - 0.6) < 0.1
     assert (block.density[top] > 0.3 * field.density.max()).mean() > 0.9
     light = relight_voxels(noisy, EditStack(), RAISED.replace(fill="none"), LIGHT)
@@ -154,15 +154,15 @@ def test_patchers_put_the_light_before_its_edit(kind: str):
     field = room(0.0) if kind == "voxels" else splat_room(True)
     edit = RAISED.replace(name="raise")
     patcher = Patcher(field, (), lambda camera: pytest.fail("the light is known"))
-    patcher.__dict__.update(ambience=LIGHT, _sight=None)
-    light, same = patcher.patched([edit])
+    patcher.__dict__.update(light_model=LIGHT, _visibility=None)
+    light, same = patcher.prepare([edit])
     assert same is edit and light.patch is not None and light.changes_anything
-    assert patcher.patched([edit])[0] is light
-    assert tuple(patcher.patched([edit], moving=True)) == (edit,)
-    assert tuple(patcher.patched([edit], bending=False)) == (edit,)
-    assert tuple(patcher.patched([edit.replace(relight="none")])) == (edit.replace(relight="none"),)
-    patcher.__dict__["ambience"] = LightModel((), ())
-    assert tuple(patcher.patched([edit])) == (edit,)
+    assert patcher.prepare([edit])[0] is light
+    assert tuple(patcher.prepare([edit], moving=True)) == (edit,)
+    assert tuple(patcher.prepare([edit], bending=False)) == (edit,)
+    assert tuple(patcher.prepare([edit.replace(relight="none")])) == (edit.replace(relight="none"),)
+    patcher.__dict__["light_model"] = LightModel((), ())
+    assert tuple(patcher.prepare([edit])) == (edit,)
 
 
 def test_the_floor_goes_on_under_splats_that_are_lifted():
@@ -199,7 +199,7 @@ def test_splats_under_what_is_lifted_get_lighter():
     inner, outer = Cage.box((0.1, 0.0, 0.45), (0.62, 0.62, 0.66)), Cage.box((0.1, 0.0, 0.85), (1.3, 1.3, 1.5))
     light = relight_splats(field, EditStack(), Edit(inner, outer).translate((0.0, 0.0, 0.4)), LIGHT)
     assert isinstance(light.patch, SplatPatch)
-    log = light.patch.light.at(field.means.astype(np.float64))
+    log = light.patch.light.interpolate(field.means.astype(np.float64))
     away = np.linalg.norm(np.maximum(np.abs(field.means[:, :2] - [0.1, 0.0]) - 0.25, 0.0), axis=1)
     under, far = on_floor & (away == 0.0), on_floor & (away > 1.3 * REACH)
     assert log[under].mean() > 0.15 and np.abs(log[far]).max() < 0.05

@@ -78,14 +78,14 @@ def lit() -> Scene:
 
 def test_the_sun_is_found_in_pictures(lit: Scene) -> None:
     edit = moved("shadow")[0]
-    sun = lit.patcher._lit(edit).sun
+    sun = lit.patcher._model_for(edit).directional
     assert sun is not None
     assert np.dot(sun.direction, SUN) > np.cos(np.radians(20.0)) and abs(sun.share - SHARE) < 0.25
 
 
 def test_no_sun_is_found_where_none_shines() -> None:
     dull = scene(room(AT, sun=0.0))
-    assert dull.patcher._lit(moved("shadow")[0]).sun is None
+    assert dull.patcher._model_for(moved("shadow")[0]).directional is None
 
 
 @pytest.mark.parametrize("relight", ["shadow", CastShadow((6.0, 3.0, 7.4))])

@@ -72,7 +72,7 @@ def patched(edits: list[Edit], field: VoxelField | None = None, **options: bool)
     """The edits with their patches by a new patcher, and how many pictures it took."""
     field = room() if field is None else field
     render = Counted(field)
-    return Patcher(field, CAMERAS, render).patched(edits, **options), render.count
+    return Patcher(field, CAMERAS, render).prepare(edits, **options), render.count
 
 
 def arrays_of(stack: EditStack) -> list[np.ndarray]:
@@ -109,8 +109,8 @@ def test_a_drag_after_opening_is_as_one_before(folder: Path) -> None:
     for _ in range(2):
         field = room()
         patcher = Patcher(field, CAMERAS, Counted(field))
-        patcher.patched([MOVE])
-        found.append(arrays_of(patcher.patched(further, moving=True)))
+        patcher.prepare([MOVE])
+        found.append(arrays_of(patcher.prepare(further, moving=True)))
     for left, right in zip(*found, strict=True):
         np.testing.assert_array_equal(left, right)
 
@@ -119,10 +119,10 @@ def test_a_drag_before_anything_is_known_is_made_again_when_it_ends() -> None:
     edit = [Edit.delete(MOVE.inner).replace(relight="none", feather=0.0)]
     field = room()
     patcher = Patcher(field, CAMERAS, Counted(field))
-    moving = patcher.patched(edit, moving=True).edits[0].patch
-    settled = patcher.patched(edit).edits[0].patch
+    moving = patcher.prepare(edit, moving=True).edits[0].patch
+    settled = patcher.prepare(edit).edits[0].patch
     assert moving is not None and settled is not None and settled is not moving
-    assert patcher.patched(edit, moving=True).edits[0].patch is settled
+    assert patcher.prepare(edit, moving=True).edits[0].patch is settled
 
 
 def test_splats_have_the_same_patches_again() -> None:
@@ -139,7 +139,7 @@ def test_splats_have_the_same_patches_again() -> None:
         return shown
 
     for _ in range(2):
-        patch = Patcher(field, cameras, render).patched([edit]).edits[0].patch
+        patch = Patcher(field, cameras, render).prepare([edit]).edits[0].patch
         assert isinstance(patch, SplatPatch) and patch.field is field
         found.append(patch)
     assert len(pictures) == 3

@@ -69,17 +69,17 @@ def test_a_turned_ball_looks_as_it_did(lit: Scene, adjustment: str) -> None:
 
 
 def test_where_light_comes_from_is_found_in_pictures(lit: Scene) -> None:
-    facing = lit.patcher.ambience.facing
+    facing = lit.patcher.light_model.diffuse
     assert facing is not None
-    found = np.array(facing.towards)
+    found = np.array(facing.gradient)
     assert found @ TOWARDS > np.cos(np.radians(25.0)) * np.linalg.norm(found) * np.linalg.norm(TOWARDS)
     assert 0.5 < np.linalg.norm(found) / np.linalg.norm(TOWARDS) < 1.1
 
 
 def test_where_all_sides_are_alike_none_is_found() -> None:
     dull = Scene(balls(np.zeros(3)), cameras={"train": cameras()})
-    facing = dull.patcher.ambience.facing
-    assert facing is None or np.linalg.norm(facing.towards) < 0.05
+    facing = dull.patcher.light_model.diffuse
+    assert facing is None or np.linalg.norm(facing.gradient) < 0.05
 
 
 def test_pairs_tell_of_light_amid_textures_and_little_or_nothing_of_none() -> None:
@@ -94,7 +94,7 @@ def test_pairs_tell_of_light_amid_textures_and_little_or_nothing_of_none() -> No
     light = DiffuseLight((0.3, -0.1, 0.4))
     change = light.log_light(second.normals) - light.log_light(first.normals)
     found = fit_diffuse_light(first, second, change + texture)
-    assert found is not None and np.abs(np.subtract(found.towards, light.towards)).max() < 0.05
+    assert found is not None and np.abs(np.subtract(found.gradient, light.gradient)).max() < 0.05
     assert fit_diffuse_light(first, second, texture) is None
     # What is so on one side alone is no light from far away.
     half = points[:, 0] > 0.5
@@ -117,5 +117,5 @@ def test_a_black_scene_can_be_edited() -> None:
     lit = balls(np.zeros(3), 32)
     black = dataclasses.replace(lit, sh=np.full_like(lit.sh, -0.5 / C0))
     scene = Scene(black, cameras={"train": cameras()})
-    assert scene.patcher.ambience.facing is None
+    assert scene.patcher.light_model.diffuse is None
     assert seen(scene.with_edits(turned("occlusion", "discrete"))).shape == seen(scene).shape

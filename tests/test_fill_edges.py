@@ -61,17 +61,17 @@ def test_the_side_of_an_edge_stays_under_a_fill() -> None:
     side = (x == EDGE) & (z < TOP - 1) & (z >= TOP - 4) & (np.abs(y - block.shape[1] // 2) < 6)
     assert side.any()
     np.testing.assert_array_equal(filled.density[side], block.density[side])
-    np.testing.assert_array_equal(filled.colours(side), block.colours(side))
+    np.testing.assert_array_equal(filled.mean_colors(side), block.mean_colors(side))
     further = (x == EDGE - 8) & (z == TOP) & (np.abs(y - block.shape[1] // 2) < 4)
-    assert (filled.density[further] > 0.0).all() and (filled.colours(further)[:, 0] > 0.6).all()
+    assert (filled.density[further] > 0.0).all() and (filled.mean_colors(further)[:, 0] > 0.6).all()
 
 
 def test_light_on_a_top_does_not_reach_around_its_edge() -> None:
     block = slab()
-    surface = extract_surfels(block).thinned(2.0 * VOXEL)
+    surface = extract_surfels(block).downsample(2.0 * VOXEL)
     up = surface.normals[:, 2] > 0.8
-    light = LightChange.of(block, surface, np.where(up, 1.0, 0.0), 2.0 * VOXEL)
-    dense = light.dense(block)
+    light = LightChange.from_surfels(block, surface, np.where(up, 1.0, 0.0), 2.0 * VOXEL)
+    dense = light.to_array(block)
     x, y, z = np.meshgrid(*(np.arange(n) for n in block.shape), indexing="ij")
     x, z = x + block.low[0], z + block.low[2]
     amid = np.abs(y - block.shape[1] // 2) < 10
@@ -83,7 +83,7 @@ def test_the_sides_of_a_support_are_not_among_what_is_unsure() -> None:
     """In deep shade only what faces as the support does is filled."""
     block = slab()
     wide, _ = near_the_edge(block)
-    cells = np.argwhere(wide.surfaced)
+    cells = np.argwhere(wide.has_surface)
     members = np.column_stack([cells, np.full(len(cells), wide.support.point[2])]).astype(np.float64)
     support = Support(wide.support.point, wide.support.normal, wide.support.axes, members)
     part = np.zeros(block.shape, bool)
@@ -101,12 +101,12 @@ def test_stripes_go_on_under_what_was_removed() -> None:
     x, y, z = np.meshgrid(*(np.arange(n) for n in block.shape), indexing="ij")
     wave = 0.5 + 0.3 * np.sin(2.0 * np.pi * y / 8.0)
     shown = block.slot >= 0
-    striped = block.with_colours(shown, np.repeat(wave[shown][:, None], 3, axis=1))
+    striped = block.with_colors(shown, np.repeat(wave[shown][:, None], 3, axis=1))
     footprint, _ = near_the_edge(block)
     middle = (x > 10) & (x < 20) & (np.abs(y - block.shape[1] // 2) < 6)
-    footprint = replace(footprint, hole=middle[..., 0], around=footprint.surfaced & ~middle[..., 0])
-    blank = striped.with_colours(shown & middle, np.full((int((shown & middle).sum()), 3), 0.9))
+    footprint = replace(footprint, hole=middle[..., 0], surroundings=footprint.has_surface & ~middle[..., 0])
+    blank = striped.with_colors(shown & middle, np.full((int((shown & middle).sum()), 3), 0.9))
     above = z + block.low[2] - TOP
     filled = inpaint_support(blank, footprint, middle & (above > 0) & (above < 6))
     at = middle & (z + block.low[2] == TOP)
-    assert np.abs(filled.colours(at)[:, 0] - wave[at]).mean() < 0.06
+    assert np.abs(filled.mean_colors(at)[:, 0] - wave[at]).mean() < 0.06

@@ -52,7 +52,7 @@ def test_bent_stripes_are_followed() -> None:
 def test_noise_has_no_grain() -> None:
     values, gap = np.random.default_rng(0).normal(size=(SIZE, SIZE)), hole()
     grain = estimate_orientation(values, ~gap, lambda known, rows: solve_membrane(gap, known, rows))
-    assert np.median(grain.alike[gap]) < 0.1
+    assert np.median(grain.coherence[gap]) < 0.1
     spanned, grained = filled(values, gap, ~gap)
     assert (grained - values[gap]).std() < 1.1 * (spanned - values[gap]).std()
 
@@ -62,7 +62,7 @@ def test_lines_that_do_not_come_out_again_bring_nothing() -> None:
     values, gap = lines(0.0), np.zeros((SIZE, SIZE), bool)
     gap[40:] = True
     grain = estimate_orientation(values, ~gap, lambda known, rows: solve_membrane(gap, known, rows))
-    assert np.abs(grain.along[20:36, 20:36, 0]).min() > 0.95  # they run into the gap
+    assert np.abs(grain.direction[20:36, 20:36, 0]).min() > 0.95  # they run into the gap
     rows, share = transport_colors(gap, ~gap, values.reshape(-1, 1), grain)
     assert (share == 0.0).all() and (rows == 0.0).all()
 
@@ -72,5 +72,5 @@ def test_nothing_known_has_no_grain() -> None:
     grain = estimate_orientation(
         np.zeros((SIZE, SIZE)), nothing, lambda known, rows: solve_membrane(gap, known, rows)
     )
-    assert not grain.alike.any()
+    assert not grain.coherence.any()
     assert not transport_colors(gap, nothing, np.zeros((SIZE * SIZE, 3)), grain)[1].any()

@@ -127,10 +127,10 @@ def test_what_the_cage_covers_is_seen_beside_the_thing(folder: Path, kept: bool)
     assert db(found.rgb, truth.rgb) > 38.0 and db(found.opacity, truth.opacity) > 38.0
     # While it is dragged, its cage is all its own; what it was put over before is known.
     patcher = scene.patcher
-    (dragged,) = patcher.patched([edit.translate((0.1, 0.0, 0.0))], moving=True, preserve_opacity=kept)
-    (again,) = patcher.patched([edit.translate((0.2, 0.0, 0.0))], moving=True, preserve_opacity=kept)
-    (still,) = patcher.patched([edit], moving=True, preserve_opacity=kept)
-    (settled,) = patcher.patched([edit], preserve_opacity=kept)
+    (dragged,) = patcher.prepare([edit.translate((0.1, 0.0, 0.0))], moving=True, preserve_opacity=kept)
+    (again,) = patcher.prepare([edit.translate((0.2, 0.0, 0.0))], moving=True, preserve_opacity=kept)
+    (still,) = patcher.prepare([edit], moving=True, preserve_opacity=kept)
+    (settled,) = patcher.prepare([edit], preserve_opacity=kept)
     assert dragged.part is again.part and settled.part is not dragged.part
     assert still.part is not None and (still.part is settled.part or still.part is dragged.part)
 
@@ -228,8 +228,8 @@ def test_surroundings_get_a_shadow(tmp_path: Path) -> None:
     assert pictures["occlusion", -0.29] < 0.85 * pictures["none", -0.29]
     assert abs(pictures["occlusion", 0.8] - pictures["none", 0.8]) < 0.01
     # While it is dragged it casts none, and keeps what it shows.
-    (moving,) = scene.patcher.patched([edit], moving=True)
-    (settled,) = scene.patcher.patched([edit])
+    (moving,) = scene.patcher.prepare([edit], moving=True)
+    (settled,) = scene.patcher.prepare([edit])
     assert moving.under is None and settled.under is not None
 
 
@@ -240,10 +240,10 @@ def test_what_is_pasted_is_read_once(folder: Path, monkeypatch: pytest.MonkeyPat
     real = Scene.open.__func__  # type: ignore[attr-defined]
     monkeypatch.setattr(Scene, "open", classmethod(lambda cls, path: opened.append(path) or real(cls, path)))
     parts = {
-        id(scene.patcher.patched([pasted(1.0).translate((x, 9.0, 0.0))])[0].part) for x in (0.0, 0.1, 0.2)
+        id(scene.patcher.prepare([pasted(1.0).translate((x, 9.0, 0.0))])[0].part) for x in (0.0, 0.1, 0.2)
     }
     assert len(opened) == len(parts) == 1
-    twice = scene.patcher.patched([pasted(1.0).translate((0.0, y, 0.0)) for y in (9.0, -9.0)])
+    twice = scene.patcher.prepare([pasted(1.0).translate((0.0, y, 0.0)) for y in (9.0, -9.0)])
     assert len(opened) == 1 and twice[0].part is twice[1].part and len(set(twice.places)) == 1
 
 

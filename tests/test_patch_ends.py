@@ -56,22 +56,28 @@ def test_the_face_of_a_part_goes_on_where_it_was_held(keep_source: bool) -> None
 
 def test_the_strength_of_a_shade_is_measured_around_it() -> None:
     scene = Scene(room(True), cameras={"train": cameras()})
-    field, sight, ambience = scene.field, scene.patcher._sight, scene.patcher.ambience
+    field, visibility, model = scene.field, scene.patcher._visibility, scene.patcher.light_model
     assert isinstance(field, VoxelField)
 
-    def strength(times: float, seen: object = sight) -> float:
-        weaker = dataclasses.replace(ambience, weights=tuple(times * w for w in ambience.weights))
-        work = EditContext.of(field, EditStack(), Edit.delete(cage()), weaker, False, True, None, seen)
-        support = work.support()
+    def strength(times: float, seen: object = visibility) -> float:
+        weaker = dataclasses.replace(model, weights=tuple(times * w for w in model.weights))
+        context = EditContext.build(field, EditStack(), Edit.delete(cage()), weaker, False, True, None, seen)
+        support = context.find_support()
         assert support is not None
         return fit_shadow_strength(
-            work.gone, work.others, work.before, work.edit.inner, work.sight, weaker, support
+            context.removed,
+            context.surroundings,
+            context.before,
+            context.edit.inner,
+            context.visibility,
+            weaker,
+            support,
         )
 
     right = strength(1.0)
     assert MIN_STRENGTH < right < MAX_STRENGTH and strength(0.6) > right + 0.15
     assert strength(1.0, None) == 1.0
-    bright = dataclasses.replace(sight, bright=np.zeros_like(sight.bright))
+    bright = dataclasses.replace(visibility, log_brightness=np.zeros_like(visibility.log_brightness))
     assert strength(1.0, bright) < 0.75  # no shade is seen there
 
 
@@ -90,12 +96,12 @@ def test_a_rim_in_deep_shade_does_not_colour_what_is_filled() -> None:
     footprint = Footprint(
         support, np.array([-20, -20]), hole, ~hole, np.ones_like(hole), np.zeros(hole.shape)
     )
-    lit = dataclasses.replace(footprint, changed=np.where(far < 0.45, 0.5, 0.0))
+    lit = dataclasses.replace(footprint, log_light_change=np.where(far < 0.45, 0.5, 0.0))
     at = (z == axis[20]) & (np.abs(y) < 1e-9)
     none = np.zeros(block.shape, bool)
 
     def across(which: Footprint) -> NDArray[np.float64]:
-        return inpaint_support(block, which, none | (away < 0.2) & (z > 0.0)).colours(at)[:, 0]
+        return inpaint_support(block, which, none | (away < 0.2) & (z > 0.0)).mean_colors(at)[:, 0]
 
     dark, bright = across(footprint), across(lit)
     assert dark[18:23].max() < 0.2 and bright[18:23].min() > 0.5
@@ -112,12 +118,12 @@ def test_what_a_lifted_part_hid_takes_the_colours_around() -> None:
     under = (np.abs(x - 0.1) < 0.2) & (np.abs(y) < 0.2) & (z < -0.35)
     rows[under] += chance.uniform(-0.5, 0.5, (int(under.sum()), 1, 3)).astype(np.float32)
     field = dataclasses.replace(field, sh=rows)
-    strong = LightModel(LIGHT.reaches, tuple(1.3 * w for w in LIGHT.weights))
+    strong = LightModel(LIGHT.radii, tuple(1.3 * w for w in LIGHT.weights))
     edit = Edit(INNER, OUTER, lattice=32).translate((0.0, 0.0, 0.35))
     light = relight_voxels(field, EditStack(), edit, strong)
     assert light is not None
     block = extract_block(field, EditStack([light]), field.bounds)
     points = block.positions(np.ones(block.shape, bool)).reshape(*block.shape, 3)
     deep = (np.abs(points[..., :2] - [0.1, 0.0]) < 0.12).all(axis=-1) & (np.abs(points[..., 2] + 0.42) < 0.02)
-    colours = block.colours(deep & (block.slot >= 0))
+    colours = block.mean_colors(deep & (block.slot >= 0))
     assert len(colours) > 20 and colours.std() < 0.05

@@ -100,7 +100,7 @@ def test_what_cameras_see_of_a_floor() -> None:
     field = room(True)
     sight = render_visibility(lambda camera: Renderer(field).render(camera), cameras(), field.bounds)
     asked = np.array([[0.1, 0.4, FLOOR], [0.1, 0.0, FLOOR - 0.15], [0.1, 0.0, 0.0]])
-    beside, beneath, within = sight.views_of(asked, 0.05)
+    beside, beneath, within = sight.count_views(asked, 0.05)
     assert beside >= 4 and beneath == within == 0
     hole = np.zeros((9, 9), bool)
     hole[1:8, 1:8] = True
@@ -111,21 +111,21 @@ def test_what_cameras_see_of_a_floor() -> None:
     nothing = np.zeros((9, 9, 9), bool)
     all_but_one = np.ones(49, bool)
     all_but_one[24] = False
-    left = footprint.without(all_but_one, nothing)
-    assert not left.hole.any() and left.around.all()  # one alone shows through a gap
+    left = footprint.remove_known(all_but_one, nothing)
+    assert not left.hole.any() and left.surroundings.all()  # one alone shows through a gap
     stands = nothing.copy()
     stands[3:6, 3:6, 3] = True
-    left = footprint.without(np.ones(49, bool), stands)
-    assert left.hole[3:6, 3:6].all() and not left.hole[1, 1] and (left.hole ^ left.around).all()
+    left = footprint.remove_known(np.ones(49, bool), stands)
+    assert left.hole[3:6, 3:6].all() and not left.hole[1, 1] and (left.hole ^ left.surroundings).all()
     # Where the support has no surface nothing is known of it.
-    bare = dataclasses.replace(footprint, surfaced=~hole)
-    assert (bare.without(np.ones(49, bool), nothing).hole == hole).all()
+    bare = dataclasses.replace(footprint, has_surface=~hole)
+    assert (bare.remove_known(np.ones(49, bool), nothing).hole == hole).all()
     # Where cameras look through it, it does not go on: unless that is a small gap amid the support.
     air = np.zeros((7, 7), bool)
     air[:, :3] = air[6, 6] = True
-    assert (footprint.without_air(air.reshape(-1)).hole == hole).all()
-    ends = dataclasses.replace(footprint, around=~hole & (np.arange(9) > 0))
-    left = ends.without_air(air.reshape(-1))
+    assert (footprint.remove_free_space(air.reshape(-1)).hole == hole).all()
+    ends = dataclasses.replace(footprint, surroundings=~hole & (np.arange(9) > 0))
+    left = ends.remove_free_space(air.reshape(-1))
     assert not left.hole[2:7, 1:4].any() and left.hole[1:8, 4:8].all()
 
 
@@ -138,13 +138,13 @@ def test_units_make_no_difference(scenes: tuple[Scene, Scene]) -> None:
 
 def test_the_fit_finds_the_shade_and_none_where_none_is(scenes: tuple[Scene, Scene]) -> None:
     scene, _ = scenes
-    ambience = scene.patcher.ambience
-    assert ambience.shows and 0.4 < sum(ambience.weights) < 0.95
+    ambience = scene.patcher.light_model
+    assert ambience.has_effect and 0.4 < sum(ambience.weights) < 0.95
     field = scene.field
     assert isinstance(field, VoxelField)
     plain = dataclasses.replace(field, sh=np.zeros_like(field.sh))
-    assert sum(Scene(plain, cameras=scene.cameras).patcher.ambience.weights) < 0.1
-    bare = Scene(plain).patcher.ambience  # without cameras it is looked at from around
+    assert sum(Scene(plain, cameras=scene.cameras).patcher.light_model.weights) < 0.1
+    bare = Scene(plain).patcher.light_model  # without cameras it is looked at from around
     assert sum(bare.weights) < 0.2
 
 
@@ -180,11 +180,11 @@ def test_patches_are_kept_while_a_cage_is_dragged(scenes: tuple[Scene, Scene]) -
     scene, _ = scenes
     edit = Edit(cage(), adjustment="discrete").translate((-0.5, 0.0, 0.0))
     further = edit.translate((-0.2, 0.0, 0.0))
-    first, second = (scene.patcher.patched([e], moving=True)[0].patch for e in (edit, further))
+    first, second = (scene.patcher.prepare([e], moving=True)[0].patch for e in (edit, further))
     assert first is second and first is not None and first.part is None
-    settled = scene.patcher.patched([further])[0].patch
+    settled = scene.patcher.prepare([further])[0].patch
     assert settled is not first and settled is not None and settled.part is not None
-    assert scene.patcher.patched([further])[0].patch is settled
+    assert scene.patcher.prepare([further])[0].patch is settled
 
 
 def other(field: VoxelField, box: NDArray[np.float64], rgb: tuple[float, float, float]) -> VoxelField:
@@ -193,7 +193,7 @@ def other(field: VoxelField, box: NDArray[np.float64], rgb: tuple[float, float, 
     every = np.ones(block.shape, bool)
     heights = block.positions(every)[:, 2]
     full = block.with_density(every, (20.0 * (heights > 0.0)).astype(np.float32))
-    return full.with_colours(full.slot >= 0, np.broadcast_to(rgb, (int((full.slot >= 0).sum()), 3))).layer()
+    return full.with_colors(full.slot >= 0, np.broadcast_to(rgb, (int((full.slot >= 0).sum()), 3))).to_layer()
 
 
 @pytest.mark.parametrize("contracted", [False, True])
@@ -321,7 +321,7 @@ def test_a_field_of_nothing_solid_is_patched() -> None:
     field = room(True)
     thin = dataclasses.replace(field, density=np.full_like(field.density, 1e-3))
     scene = Scene(thin, EditStack([Edit.delete(cage())]))
-    assert not scene.patcher.ambience.shows
+    assert not scene.patcher.light_model.has_effect
     assert np.isfinite(scene.render(cameras()[0]).rgb).all()
 
 
@@ -338,7 +338,7 @@ def test_options_are_read_and_written(tmp_path: Path) -> None:
 
 
 def test_openness_needs_weights() -> None:
-    assert not LightModel((), ()).shows and LightModel((), ()).reach == 0.0
+    assert not LightModel((), ()).has_effect and LightModel((), ()).max_radius == 0.0
     both = LightModel((0.1, 0.2), (0.5, 0.5))
     np.testing.assert_allclose(np.exp(both.log_openness(np.array([[0.0, 0.0], [1.0, 0.0]]))), [1.0, 0.5])
 

@@ -292,7 +292,7 @@ def shaded() -> Scene:
     """A ball of small voxels, whose colours are said to follow its openness."""
     field = ball_field(resolution=65)
     scene = Scene(field)
-    scene.patcher.__dict__["ambience"] = LightModel(occlusion_radii(field), (0.1, 0.2, 0.2, 0.2, 0.2))
+    scene.patcher.__dict__["light_model"] = LightModel(occlusion_radii(field), (0.1, 0.2, 0.2, 0.2, 0.2))
     return scene
 
 
@@ -301,7 +301,7 @@ def test_switching_fill_and_light_changes_pictures_where_patches_reach(shaded: S
     patched = PATCHED[name]
     bare = patched.replace(fill="none", relight="none", feather=0.0)
     extent = PatchExtent(shaded.field)
-    region = shaded.patcher.patched([patched])[0].boxes
+    region = shaded.patcher.prepare([patched])[0].boxes
     assert (extent.boxes(patched).min(axis=(0, 1)) <= region.min(axis=(0, 1))).all()
     assert (extent.boxes(patched).max(axis=(0, 1)) >= region.max(axis=(0, 1))).all()
     assert np.array_equal(extent.boxes(bare), bare.boxes)
@@ -316,12 +316,12 @@ def test_switching_fill_and_light_changes_pictures_where_patches_reach(shaded: S
 
 def test_edits_that_stay_keep_their_shadows_while_another_moves(shaded: Scene) -> None:
     edits = [PATCHED["copy"], PATCHED["move"]]
-    settled = shaded.patcher.patched(edits)
+    settled = shaded.patcher.prepare(edits)
     moved = [edits[0], edits[1].translate((0, 0, 0.1))]
-    moving = shaded.patcher.patched(moved, moving=True)
+    moving = shaded.patcher.prepare(moved, moving=True)
     assert moving[0].patch is settled[0].patch is not None
     assert moving[1].patch is not None and moving[1].patch.part is None
-    assert shaded.patcher.patched([edits[0].translate((0, 0, 0.1))], moving=True)[0].patch is None
+    assert shaded.patcher.prepare([edits[0].translate((0, 0, 0.1))], moving=True)[0].patch is None
 
 
 @pytest.mark.parametrize("view", ["colour", "depth", "opacity", "normals"])

@@ -206,12 +206,12 @@ def test_scenes_fill_and_relight_splats_unless_told_not_to():
     (kept,) = scene.with_edits(EditStack([edit.replace(fill="none", relight="none")])).patched_edits
     assert kept.patch is None
     patcher = Patcher(field, cameras(), lambda camera: pytest.fail("a drag found out about the light"))
-    (moving,) = patcher.patched([edit], moving=True)
+    (moving,) = patcher.prepare([edit], moving=True)
     assert isinstance(moving.patch, SplatPatch) and moving.patch.part is None
     # Without light a patch does not depend on where the part is put down.
     move = Edit(cage(), adjustment="discrete", relight="none").translate((0.5, 0.0, 0.0))
     further = move.translate((0.1, 0.0, 0.0))
-    there, further = (scene.patcher.patched([each])[0] for each in (move, further))
+    there, further = (scene.patcher.prepare([each])[0] for each in (move, further))
     assert there.patch is further.patch is not None
 
 

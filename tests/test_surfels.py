@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from cagefield.cameras.camera import Camera
 from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.surfaces.grid_block import extract_block
-from cagefield.completion.surfaces.plane_snapping import flattened
+from cagefield.completion.surfaces.plane_snapping import snap_to_planes
 from cagefield.completion.surfaces.surfels import (
     FAR_DISTANCE,
     Surfels,
@@ -89,7 +89,7 @@ def test_a_block_of_nothing_has_no_surface() -> None:
     surface = extract_surfels(block)
     assert len(surface.points) == 0 and (surface.distance(np.zeros((2, 3))) == FAR_DISTANCE).all()
     assert (build_distance_grid([surface], 0.1)(np.zeros((2, 3))) == FAR_DISTANCE).all()
-    assert surface.thinned(0.1) is surface
+    assert surface.downsample(0.1) is surface
 
 
 def test_distances_on_a_grid_are_those_to_the_nearest() -> None:
@@ -111,10 +111,10 @@ def test_only_what_the_way_passed_through_is_deep_shade() -> None:
     up, down = np.tile([0.0, 0.0, 1.0], (len(flat), 1)), np.tile([0.0, 0.0, -1.0], (len(flat), 1))
     reaches = (0.02, 0.04, 0.08, 0.16, 0.24)
     sheet = Surfels(flat + np.array([0.0, 0.0, 0.2]), up)
-    near = concatenate_surfels([ground, sheet]).nearness(ground, reaches)[0]
+    near = concatenate_surfels([ground, sheet]).occlusion_terms(ground, reaches)[0]
     np.testing.assert_allclose(near, [0, 0, 0, 1 - 0.04 / 0.16, 1 - 0.04 / 0.24], atol=0.06)
     lid = Surfels(flat + np.array([0.0, 0.0, 0.1]), down)
-    both = concatenate_surfels([ground, sheet, lid]).nearness(ground, reaches)[0]
+    both = concatenate_surfels([ground, sheet, lid]).occlusion_terms(ground, reaches)[0]
     np.testing.assert_allclose(both, [0, 0, 1 - 0.02 / 0.08, 1, 1 - 0.04 / 0.24], atol=0.06)
 
 
@@ -136,7 +136,7 @@ def test_thinned_surfaces_keep_both_sides() -> None:
     both = concatenate_surfels(
         [plane(4000, 0.0, 0), Surfels(plane(4000, 0.0, 1).points, np.tile([0.0, 0.0, -1.0], (4000, 1)))]
     )
-    thin = both.thinned(0.2)
+    thin = both.downsample(0.2)
     assert len(thin.points) < 400
     down = thin.normals[:, 2] < 0.0
     assert down.sum() > 80 and (~down).sum() > 80 and (np.abs(thin.normals[down, 2]) > 0.99).all()
@@ -145,13 +145,13 @@ def test_thinned_surfaces_keep_both_sides() -> None:
 def test_surfaces_far_away_are_thinned_too() -> None:
     near = plane(500, 0.0, 8)
     far = Surfels(np.array([[1e9, -1e9, 1e9], [-1e9, 1e9, -1e9]]), np.tile([0.0, 0.0, 1.0], (2, 1)))
-    thin = concatenate_surfels([near, far]).thinned(0.01)
+    thin = concatenate_surfels([near, far]).downsample(0.01)
     assert len(thin.points) > 400 and (np.abs(thin.points).max(axis=1) > 1e8).sum() == 2
 
 
 def test_planes_get_their_normals_and_spheres_keep_theirs() -> None:
     floor, ball = plane(6000, 0.004, 2), sphere(3000, np.array([0.0, 0.0, 0.6]), 0.3, 3)
-    flat, on = flattened(concatenate_surfels([floor, ball]), 0.01)
+    flat, on = snap_to_planes(concatenate_surfels([floor, ball]), 0.01)
     assert on[:6000].mean() > 0.8 and on[6000:].mean() < 0.12
     assert np.degrees(np.arccos(flat.normals[:6000][on[:6000], 2])).max() < 0.5
     assert np.abs(flat.points[:6000][on[:6000], 2]).max() < 0.001
@@ -168,10 +168,10 @@ def test_bumps_amid_a_plane_are_put_on_it_and_its_edge_keeps_its_normals() -> No
         [chance.uniform(1.0, 1.02, 200), chance.uniform(-1.0, 1.0, 200), np.full(200, -0.02)], axis=1
     )
     surface = concatenate_surfels([top, bumps, Surfels(rim, tilted)])
-    flat, on = flattened(surface, 0.05, edges=True)
+    flat, on = snap_to_planes(surface, 0.05, edges=True)
     assert on[:6000].all() and on[6000:6200].mean() > 0.98 and on[6200:].mean() < 0.02
     np.testing.assert_array_equal(flat.normals[6200:][~on[6200:]], tilted[~on[6200:]])
-    _, on = flattened(surface, 0.05)
+    _, on = snap_to_planes(surface, 0.05)
     assert on.all()
 
 
@@ -190,7 +190,7 @@ def test_a_rigid_motion_leaves_a_parts_shade_on_itself() -> None:
     )
     light = LightModel((0.1, 0.3), (0.3, 0.4))
     turn = Rotation.from_euler("XYZ", (0.4, -0.8, 1.1)).as_matrix()
-    moved = part.turned(part.points @ turn.T + [3.0, -2.0, 1.0], np.broadcast_to(turn, (4000, 3, 3)))
+    moved = part.transform(part.points @ turn.T + [3.0, -2.0, 1.0], np.broadcast_to(turn, (4000, 3, 3)))
     before, after = light.log_light([part], part), light.log_light([moved], moved)
     assert before.min() < -0.2
     np.testing.assert_allclose(after, before, atol=1e-6)

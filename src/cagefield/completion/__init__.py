@@ -1,3 +1,3 @@
-"""Patches: what discrete edits uncovered is filled, and shadows go along."""
+"""Completion of edited fields: inpainting of uncovered surfaces, and relighting."""
 
 from __future__ import annotations

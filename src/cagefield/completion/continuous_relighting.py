@@ -1,18 +1,16 @@
-"""The light of a continuous edit: what it bends takes its contact shadows along.
+"""Relighting of a continuous edit: its bent content takes contact shadows along.
 
-A sample of the deformed field shows a canonical point; the light on that point is changed before the edit
-takes it anywhere. So this light is an edit of its own, right before the continuous one, that moves nothing:
-its patch shows the surroundings, and what is between the cages, in the light that falls on it once it is
-bent. What the part stood on, or hung over, was hidden or in deep shade: it goes on there, as under a part
-that is moved (`completion.inpainting.support_inpainting`). With F the edit's map to deformed space, the
-light on a canonical point
-p with normal n is multiplied by
+A sample of the deformed field shows a canonical point, whose light is changed before the edit maps it
+anywhere. The change is an edit of its own, right before the continuous one, that moves nothing: its patch
+shows the surroundings, and the content of the shell, in the light of the deformed scene. The support of the
+part was hidden, or in deep shade, and is inpainted as under a part that is moved
+(`completion.inpainting.support_inpainting`). With F the edit's map to deformed space, the light on a
+canonical point p with normal n is multiplied by
 
     o'(F(p), F_*(n)) / o(p, n),
 
-o the openness (`completion.lighting.ambient_occlusion`) among what is solid, o' among what is solid in
-deformed space. It is smooth
-and worked out on a grid of at most FINEST vertices an axis.
+o the openness (`completion.lighting.ambient_occlusion`) in the canonical scene, o' in the deformed one. The
+ratio is smooth, and is computed on a grid of at most MAX_VERTICES_PER_AXIS vertices an axis.
 """
 
 from __future__ import annotations
@@ -29,7 +27,7 @@ from cagefield.completion.lighting.light_change import LightChange
 from cagefield.completion.surfaces.footprint import build_footprint
 from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
 from cagefield.completion.surfaces.patch_bounds import SUPPORT_DISTANCE_VOXELS, extrude_box
-from cagefield.completion.surfaces.plane_snapping import flattened
+from cagefield.completion.surfaces.plane_snapping import snap_to_planes
 from cagefield.completion.surfaces.support_plane import Support, find_support
 from cagefield.completion.surfaces.surface_color import denoise_colors
 from cagefield.completion.surfaces.surfels import Surfels, extract_surfels
@@ -43,32 +41,35 @@ from cagefield.typing import Array, Mask
 from cagefield.warps.forward import to_deformed
 
 MAX_VERTICES_PER_AXIS = 128
-"""Vertices along the longest axis of the grid that the light is worked out on."""
+"""Maximum number of vertices along the longest axis of the grid of the light."""
 
 MIN_FILLED_LOG_GAIN = 0.45
-"""Where light is to grow by more than this (log) on what was beneath a part, that is filled. It may well be
-behind the part for all cameras but the lowest ones."""
+"""Gain of light (log) above which the support beneath a part is inpainted: only the lowest cameras may see
+it.
+"""
 
 MIN_MARGIN_VOXELS = 24.0
-"""How far around what was in deep shade its surroundings are looked at, at least; voxels."""
+"""Minimum margin around surfaces in deep shade in which their support is searched, voxels."""
 
 MIN_BENT_LOG_CHANGE = 0.03
-"""The log of a change of light that is left out."""
+"""Minimum change of light (log); smaller ones are dropped."""
 
 
-def light_box(edit: Edit, voxel: float, reach: float, falls: Array) -> Array:
-    """The box [2,3] (min, max) in which a continuous edit changes the light; arguments as of `patch_box`."""
+def light_box(edit: Edit, voxel: float, max_radius: float, shadow_directions: Array) -> Array:
+    """World-space box [2,3] (min, max) in which a continuous edit changes light; arguments as in
+    `patch_box`.
+    """
     assert edit.outer is not None
-    margin = 1.5 * reach + SUPPORT_DISTANCE_VOXELS * voxel
-    return np.asarray(extrude_box(edit.outer.aabb, falls) + margin * np.array([[-1.0], [1.0]]))
+    margin = 1.5 * max_radius + SUPPORT_DISTANCE_VOXELS * voxel
+    return np.asarray(extrude_box(edit.outer.aabb, shadow_directions) + margin * np.array([[-1.0], [1.0]]))
 
 
 @dataclass(frozen=True, eq=False)
 class BentLight:
-    """The light on a coarser block once a continuous edit has bent it.
+    """Change of light by a continuous edit, on a coarse `block` with surfels `surface` [N].
 
-    light: what the light on the block's vertices is multiplied by; log [N]: the same of the surface elements,
-    without what a turn does.
+    light: the change on the block's vertices; log [N]: its log ratio on the surfels, without the diffuse
+    term.
     """
 
     block: GridBlock
@@ -77,26 +78,28 @@ class BentLight:
     light: LightChange
 
 
-def compute_bent_light(block: GridBlock, edit: Edit, ambience: LightModel) -> BentLight:
-    """What becomes of the light on a block that a continuous edit bends."""
+def compute_bent_light(block: GridBlock, edit: Edit, model: LightModel) -> BentLight:
+    """Change of light of a block by a continuous edit."""
     assert edit.outer is not None
-    coarse = block.pooled(max(1, -(-max(block.shape) // MAX_VERTICES_PER_AXIS))).reaching(edit.outer.aabb)
-    surface, _ = flattened(extract_surfels(coarse), max(coarse.spacing))
+    coarse = block.pool(max(1, -(-max(block.shape) // MAX_VERTICES_PER_AXIS))).pad_to(edit.outer.aabb)
+    surface, _ = snap_to_planes(extract_surfels(coarse), max(coarse.spacing))
     if not len(surface.points):
         return BentLight(coarse, surface, np.zeros(0), LightChange(np.zeros(coarse.shape, bool), np.zeros(0)))
     moved = to_deformed(edit.exact_warp, surface.points, coarse=True)
-    bent = surface.turned(moved.points, moved.jacobian)
-    turned = ambience.log_facing(bent) - ambience.log_facing(surface)
-    log = ambience.log_light([bent], bent) - ambience.log_light([surface], surface)
-    seen = np.where(np.abs(log) < MIN_BENT_LOG_CHANGE, 0.0, log)
-    light = LightChange.of(coarse, surface, seen, 2.0 * max(coarse.spacing))
-    return BentLight(coarse, surface, log - turned, light)
+    bent = surface.transform(moved.points, moved.jacobian)
+    diffuse = model.log_diffuse(bent) - model.log_diffuse(surface)
+    log = model.log_light([bent], bent) - model.log_light([surface], surface)
+    visible_log = np.where(np.abs(log) < MIN_BENT_LOG_CHANGE, 0.0, log)
+    light = LightChange.from_surfels(coarse, surface, visible_log, 2.0 * max(coarse.spacing))
+    return BentLight(coarse, surface, log - diffuse, light)
 
 
-def extract_bent_block(field: VoxelField, below: EditStack, edit: Edit, ambience: LightModel) -> GridBlock:
-    """The block of a voxel field, under the edits below, in which a continuous edit changes the light."""
+def extract_bent_block(field: VoxelField, below: EditStack, edit: Edit, model: LightModel) -> GridBlock:
+    """Block of a voxel field, under the edits below, in which a continuous edit changes light."""
     return extract_block(
-        field, below, light_box(edit, float(field.voxel_size.max()), ambience.reach, ambience.falls)
+        field,
+        below,
+        light_box(edit, float(field.voxel_size.max()), model.max_radius, model.shadow_directions),
     )
 
 
@@ -104,111 +107,117 @@ def relight_voxels(
     field: VoxelField,
     below: EditStack,
     edit: Edit,
-    ambience: LightModel,
+    model: LightModel,
     block: GridBlock | None = None,
-    sight: CameraVisibility | None = None,
+    visibility: CameraVisibility | None = None,
 ) -> Edit | None:
-    """The edit that changes the light of a voxel field under a continuous edit; None where none changes.
+    """Edit that changes the light of a voxel field under a continuous edit; None if no light changes.
 
-    `block` is its `bent_block`, where that is known. What cameras did see, by their `sight` of the field
-    without edits, is not filled; nothing is unless the edit's `fill` is "surroundings".
+    `block` is its `extract_bent_block`, if that is known. With `fill` "surroundings" the support in deep
+    shade is inpainted, except surfaces that cameras see by their `visibility` of the field without edits.
     """
-    box = light_box(edit, float(field.voxel_size.max()), ambience.reach, ambience.falls)
-    block = block or extract_bent_block(field, below, edit, ambience)
-    bent = compute_bent_light(block, edit, ambience)
+    box = light_box(edit, float(field.voxel_size.max()), model.max_radius, model.shadow_directions)
+    block = block or extract_bent_block(field, below, edit, model)
+    bent = compute_bent_light(block, edit, model)
     relit = apply_bent_light(block, bent)[0]
     if edit.fill == "surroundings":
-        relit = inpaint_shaded_support(relit, edit, bent, below, sight)[0]
-    changed = relit.differs(block)
+        relit = inpaint_shaded_support(relit, edit, bent, below, visibility)[0]
+    changed = relit.changed_from(block)
     if not changed.any():
         return None
-    region, relit = relit.around(changed, Cage.box(box.mean(axis=0), box[1] - box[0]))
-    return light_edit(edit, Patch(region, relit.layer()))
+    region, relit = relit.crop_to_changes(changed, Cage.box(box.mean(axis=0), box[1] - box[0]))
+    return light_edit(edit, Patch(region, relit.to_layer()))
 
 
 def apply_bent_light(block: GridBlock, bent: BentLight) -> tuple[GridBlock, LightChange]:
-    """(the block in the light of what was bent, that light on its vertices)."""
+    """(block in the light of the deformed scene, change of light on the block's vertices)."""
     where = block.slot >= 0
-    log = bent.light.at(bent.block, block.positions(where))
+    log = bent.light.interpolate(bent.block, block.positions(where))
     log[np.abs(log) < MIN_BENT_LOG_CHANGE] = 0.0
-    return denoise_colors(block, where, log).relit(where, np.exp(log)), LightChange(where, log)
+    return denoise_colors(block, where, log).scale_colors(where, np.exp(log)), LightChange(where, log)
 
 
 def inpaint_shaded_support(
-    block: GridBlock, edit: Edit, bent: BentLight, below: EditStack, sight: CameraVisibility | None
+    block: GridBlock, edit: Edit, bent: BentLight, below: EditStack, visibility: CameraVisibility | None
 ) -> tuple[GridBlock, Support | None]:
-    """(the block, in its new light, with what the part stood on going on where it was in deep shade, that).
+    """(block with the support inpainted where it was in deep shade, the support or None).
 
-    What was photographed there is noise, which the new light would bring out. The support is None where none
-    goes on.
+    The block is in its new light, which amplifies the noise of colors photographed in deep shade.
     """
-    at = block.coordinates(bent.surface.points)
+    coordinates = block.block_coordinates(bent.surface.points)
     dark = bent.log > MIN_FILLED_LOG_GAIN
     if not dark.any():
         return block, None
-    # Not all that is bent: what is dark, and as much again around it.
-    low, high = at[dark].min(axis=0), at[dark].max(axis=0)
+    # Crop to the dark surfels and a margin of half their extent.
+    low, high = coordinates[dark].min(axis=0), coordinates[dark].max(axis=0)
     margin = max(MIN_MARGIN_VOXELS, 0.5 * float((high - low).max()))
     first = np.maximum(np.floor(low - margin), 0.0).astype(np.int64)
-    small = block.cropped(first, np.ceil(high + margin).astype(np.int64))
-    inside = edit.inner.contains(small.positions(np.ones(small.shape, bool))).reshape(small.shape)
-    support = _find_part_support(small, inside, edit, bent, at - first)
+    crop = block.crop(first, np.ceil(high + margin).astype(np.int64))
+    inside = edit.inner.contains(crop.positions(np.ones(crop.shape, bool))).reshape(crop.shape)
+    support = _find_part_support(crop, inside, edit, bent, coordinates - first)
     if support is None:
         return block, None
-    continued = _inpaint_shaded(small, inside, bent, at - first, dark, support, below, sight)
-    if continued is None:
+    inpainted = _inpaint_shaded(crop, inside, bent, coordinates - first, dark, support, below, visibility)
+    if inpainted is None:
         return block, None
-    part = tuple(slice(a, a + n) for a, n in zip(small.low - block.low, small.shape, strict=True))
+    slices = tuple(slice(a, a + n) for a, n in zip(crop.low - block.low, crop.shape, strict=True))
     density, slot = block.density.copy(), block.slot.copy()
-    density[part], slot[part] = continued.density, continued.slot
-    whole = replace(block, density=density, slot=slot, sh=continued.sh)
+    density[slices], slot[slices] = inpainted.density, inpainted.slot
+    whole = replace(block, density=density, slot=slot, sh=inpainted.sh)
     return whole, replace(support, point=support.point + first, members=support.members + first)
 
 
 def _find_part_support(
-    block: GridBlock, inside: Mask, edit: Edit, bent: BentLight, at: Array
+    block: GridBlock, inside: Mask, edit: Edit, bent: BentLight, coordinates: Array
 ) -> Support | None:
-    """What the part, `inside` [X,Y,Z], stands on, or hangs over, of the surfaces [N] at block coordinates."""
+    """Support of the part, `inside` [X,Y,Z], among surfels at `coordinates` [N,3]; None without one."""
     part = block.solid & inside
     if not part.any():
         return None
-    away = ndimage.distance_transform_edt(~inside)
-    away = np.asarray(ndimage.map_coordinates(away, at.T, order=1, cval=np.inf))
+    distance = ndimage.distance_transform_edt(~inside)
+    distance = np.asarray(ndimage.map_coordinates(distance, coordinates.T, order=1, cval=np.inf))
     size = float(np.median(np.subtract(*edit.inner.aabb[::-1]))) / max(block.spacing)
-    near = (away > 0.0) & (away < max(SUPPORT_DISTANCE_VOXELS, 0.5 * size))
-    return find_support(part, bent.surface, at, near, max(bent.block.spacing))
+    near = (distance > 0.0) & (distance < max(SUPPORT_DISTANCE_VOXELS, 0.5 * size))
+    return find_support(part, bent.surface, coordinates, near, max(bent.block.spacing))
 
 
 def _inpaint_shaded(
     block: GridBlock,
     inside: Mask,
     bent: BentLight,
-    at: Array,
+    coordinates: Array,
     dark: NDArray[np.bool_],
     support: Support,
     below: EditStack,
-    sight: CameraVisibility | None,
+    visibility: CameraVisibility | None,
 ) -> GridBlock | None:
-    """The block with a support going on, by surfaces [N] at block coordinates, of which some are dark."""
+    """Block with a support inpainted; None without a footprint.
+
+    coordinates [N,3]: block coordinates of the surfels; dark [N]: mask of the surfels in deep shade.
+    """
     part = block.solid & inside
-    unsure = Surfels(at[dark], bent.surface.normals[dark])
-    footprint = build_footprint(support, part, np.zeros((0, 3)), unsure)
+    shaded = Surfels(coordinates[dark], bent.surface.normals[dark])
+    footprint = build_footprint(support, part, np.zeros((0, 3)), shaded)
     if footprint is None:
         return None
     points = footprint.points(block)
-    known = bent.light.at(bent.block, points) < MIN_FILLED_LOG_GAIN
-    if sight is not None:
-        # What an edit below made up under the part is filled again: there is more to go by now.
-        where = below.to_canonical(points).points
-        known &= sight.views_of(where, DEPTH_TOLERANCE_VOXELS * max(block.spacing)) >= MIN_VIEWS
-    footprint = footprint.without(known, part)
-    changed = np.zeros(footprint.hole.shape)
-    changed[footprint.around] = bent.light.at(bent.block, footprint.points(block, footprint.around))
-    return inpaint_support(block, replace(footprint, changed=changed), inside, stays=True)
+    is_known = bent.light.interpolate(bent.block, points) < MIN_FILLED_LOG_GAIN
+    if visibility is not None:
+        # Inpainted layers of edits below are inpainted again: more of the surroundings is known here.
+        canonical = below.to_canonical(points).points
+        is_known &= (
+            visibility.count_views(canonical, DEPTH_TOLERANCE_VOXELS * max(block.spacing)) >= MIN_VIEWS
+        )
+    footprint = footprint.remove_known(is_known, part)
+    log_change = np.zeros(footprint.hole.shape)
+    log_change[footprint.surroundings] = bent.light.interpolate(
+        bent.block, footprint.points(block, footprint.surroundings)
+    )
+    return inpaint_support(block, replace(footprint, log_light_change=log_change), inside, keep_removed=True)
 
 
 def light_edit(edit: Edit, patch: Patch | SplatPatch) -> Edit:
-    """An edit that moves nothing and shows a patch, for what another one does."""
+    """Edit that moves nothing and shows the patch with the light of another edit."""
     low, high = patch.region.aabb
     nothing = Cage.box(low, 1e-6 * (high - low))
     return Edit.delete(nothing, name=edit.name).replace(fill="none", relight="none", patch=patch)

@@ -1,4 +1,4 @@
-"""What one discrete edit took away is filled, and light goes along: on a block of a voxel field's grid."""
+"""Patch of one discrete edit of a voxel field: inpainting of the support it uncovers, and relighting."""
 
 from __future__ import annotations
 
@@ -31,19 +31,22 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.typing import Mask
 
 FREE_SPACE_VOXELS = 3.0
-"""What is so much before what a camera shows, in voxels, is air."""
+"""Distance in front of the rendered depth from which on a point lies in free space, voxels."""
 
 
 @dataclass(frozen=True, eq=False)
 class PatchResult:
-    """What was worked out for a discrete edit.
+    """Computed patch of a discrete edit.
 
-    before: the block as the edits below make it; under: with V^c emptied, filled and in its new light; inside
-    [X,Y,Z]: V^c; light: on all but the part, and part_light: on the part, None where these stay as they were;
-    support: what was filled, None where nothing was.
+    Attributes:
+        context: the edit's context.
+        under: the block with V^c emptied, inpainted and in its new light.
+        light: the change of light on all but the part, None where light stays.
+        part_light: the change of light on the part, None where light stays.
+        support: the support that was inpainted, None if none was.
     """
 
-    work: EditContext
+    context: EditContext
     under: GridBlock
     light: LightChange | None
     part_light: LightChange | None
@@ -51,104 +54,129 @@ class PatchResult:
 
     @property
     def before(self) -> GridBlock:
-        return self.work.before
+        """Block as the edits below make it."""
+        return self.context.before
 
     @property
     def inside(self) -> Mask:
-        return self.work.inside
+        """Mask [X,Y,Z] of V^c."""
+        return self.context.inside
 
     @cached_property
     def emptied(self) -> GridBlock:
-        """The block with V^c emptied, in its new light, before it is filled."""
-        return apply_light(self.work.emptied, self.light)
+        """Block with V^c emptied, in its new light, before inpainting."""
+        return apply_light(self.context.emptied, self.light)
 
 
 def compute_patch(
     field: VoxelField,
     below: EditStack,
     edit: Edit,
-    ambience: LightModel | None,
+    model: LightModel | None,
     *,
-    settled: bool = True,
-    sight: CameraVisibility | None = None,
+    include_destination: bool = True,
+    visibility: CameraVisibility | None = None,
     preserve_opacity: bool = True,
     after: VoxelField | None = None,
 ) -> PatchResult:
-    """What a discrete edit of a field makes of it, under the edits below; `ambience` None leaves the light.
+    """Patch of a discrete edit of a field under the edits below, on a grid block.
 
-    A copy is not filled, as nothing is uncovered. Unless it is `settled`, the part casts no shadow where it
-    is moved to, and keeps the light that it had. A paste keeps that in any case, and takes nothing away;
-    `after` is the field with it, where the edit does not say that. What cameras did see, by their `sight` of
-    the field without edits, is not filled.
+    A copy uncovers nothing and inpaints nothing; a paste moreover keeps its own light.
+
+    Args:
+        model: the light model, None to leave light as it is.
+        include_destination: whether the part casts its shadow, and is relit, at its destination.
+        visibility: visible surfaces of the field without edits, which are not inpainted.
+        after: the field with a paste, if `edit` does not hold the paste's content.
     """
-    work = EditContext.of(field, below, edit, ambience, settled, preserve_opacity, after, sight)
-    lighting = part_light = footprint = support = None
-    lit = ambience if ambience is not None and ambience.shows else None
-    under, logs, strength = work.emptied, np.zeros(len(work.lit.points)), 1.0
-    found = work.support() if edit.source is None else None
-    if lit is not None:
-        if found is not None:
+    context = EditContext.build(
+        field, below, edit, model, include_destination, preserve_opacity, after, visibility
+    )
+    light = part_light = footprint = support = None
+    active_model = model if model is not None and model.has_effect else None
+    under, log_change, strength = context.emptied, np.zeros(len(context.light_surfels.points)), 1.0
+    part_support = context.find_support() if edit.source is None else None
+    if active_model is not None:
+        if part_support is not None:
             strength = fit_shadow_strength(
-                work.gone, work.others, work.before, edit.inner, work.sight, lit, found
+                context.removed,
+                context.surroundings,
+                context.before,
+                edit.inner,
+                context.visibility,
+                active_model,
+                part_support,
             )
-        logs = strength * work.without_part(lit)
-        lighting = LightChange.of(under, work.lit, logs, work.apart)
-        under = apply_light(under, lighting)
+        log_change = strength * context.light_change_without_part(active_model)
+        light = LightChange.from_surfels(under, context.light_surfels, log_change, context.light_spacing)
+        under = apply_light(under, light)
     if edit.fill == "surroundings" and not edit.keep_source:
-        support = found
+        support = part_support
     if support is not None:
-        dark = work.lit.take(logs > MAX_TRUSTED_LOG_GAIN)
-        unsure = replace(dark, points=under.coordinates(dark.points))
-        footprint = build_footprint(support, work.part, work.close, unsure)
-    if footprint is not None and sight is not None:
-        footprint = footprint.without_air(
-            count_edited_views(footprint.points(under), below, sight, -FREE_SPACE_VOXELS * work.voxel)
+        shaded = context.light_surfels.take(log_change > MAX_TRUSTED_LOG_GAIN)
+        block_shaded = replace(shaded, points=under.block_coordinates(shaded.points))
+        footprint = build_footprint(support, context.part, context.contact, block_shaded)
+    if footprint is not None and visibility is not None:
+        footprint = footprint.remove_free_space(
+            count_edited_views(footprint.points(under), below, visibility, -FREE_SPACE_VOXELS * context.voxel)
             >= MIN_VIEWS
         )
         points = footprint.points(under)
-        known = is_reliable(points, below, sight, under, lighting) & ~edit.inner.contains(points)
-        footprint = footprint.without(known, work.part)
+        is_known = is_reliable(points, below, visibility, under, light) & ~edit.inner.contains(points)
+        footprint = footprint.remove_known(is_known, context.part)
     if footprint is None or not footprint.hole.any():
         support = footprint = None
     else:
-        under = inpaint_support(under, _with_light_change(footprint, under, lighting), work.inside)
+        under = inpaint_support(under, _with_light_change(footprint, under, light), context.inside)
     if isinstance(edit.fill, Clone) and not edit.keep_source:
         cages = edit.inner, edit.fill.source
-        under = clone_cage(under, below, cages, work.inside, work.surface, preserve_opacity)
-    if lit is not None and lighting is not None and work.settled:
-        cast, part_light = work.cast(under, footprint, lit, strength)
-        under = apply_light(under, cast)
-        lighting = lighting.plus(cast)
-    return PatchResult(work, under, lighting, part_light, support)
+        under = clone_cage(under, below, cages, context.inside, context.surface, preserve_opacity)
+    if active_model is not None and light is not None and context.include_destination:
+        destination_light, part_light = context.light_change_at_destination(
+            under, footprint, active_model, strength
+        )
+        under = apply_light(under, destination_light)
+        light = light.combine(destination_light)
+    return PatchResult(context, under, light, part_light, support)
 
 
 def _with_light_change(footprint: Footprint, block: GridBlock, light: LightChange | None) -> Footprint:
-    """The footprint that knows by how much the light on the columns around was changed."""
+    """Footprint with the log ratio of light on its surroundings."""
     if light is None:
         return footprint
-    changed = np.zeros(footprint.hole.shape)
-    changed[footprint.around] = light.at(block, footprint.points(block, footprint.around))
-    return replace(footprint, changed=changed)
+    log_change = np.zeros(footprint.hole.shape)
+    log_change[footprint.surroundings] = light.interpolate(
+        block, footprint.points(block, footprint.surroundings)
+    )
+    return replace(footprint, log_light_change=log_change)
 
 
 def build_patch(
     field: VoxelField,
     below: EditStack,
     edit: Edit,
-    ambience: LightModel | None,
+    model: LightModel | None,
     *,
-    settled: bool = True,
-    sight: CameraVisibility | None = None,
+    include_destination: bool = True,
+    visibility: CameraVisibility | None = None,
     preserve_opacity: bool = True,
 ) -> Patch:
-    """The patch of a discrete edit of a voxel field, as `made_of` works it out."""
-    made = compute_patch(
-        field, below, edit, ambience, settled=settled, sight=sight, preserve_opacity=preserve_opacity
+    """Patch of a discrete edit of a voxel field; arguments as in `compute_patch`."""
+    result = compute_patch(
+        field,
+        below,
+        edit,
+        model,
+        include_destination=include_destination,
+        visibility=visibility,
+        preserve_opacity=preserve_opacity,
     )
-    changed = made.under.differs(made.before) | made.inside
-    region, under = made.under.around(changed, made.work.region)
-    whole = apply_light(made.before, made.part_light)
-    if settled and edit.source is None and edit.fill != "none" and not edit.deleted:
-        whole = close_cut_end(whole, made.inside, made.work.gone, made.part_light, below, sight)
-    part = made.work.shown_part(whole, made.under)
-    return Patch(region, under.layer(), None if part is None else part.layer())
+    mask = result.under.changed_from(result.before) | result.inside
+    region, under = result.under.crop_to_changes(mask, result.context.region)
+    part_block = apply_light(result.before, result.part_light)
+    if include_destination and edit.source is None and edit.fill != "none" and not edit.deleted:
+        part_block = close_cut_end(
+            part_block, result.inside, result.context.removed, result.part_light, below, visibility
+        )
+    part = result.context.extract_part(part_block, result.under)
+    return Patch(region, under.to_layer(), None if part is None else part.to_layer())

@@ -1,4 +1,4 @@
-"""The block of one discrete edit: its surfaces, and what the light on them is multiplied by."""
+"""Context of one discrete edit: the block around its cages, its surfels, and the change of light on them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cagefield.completion.lighting.light_change import LightChange
 from cagefield.completion.surfaces.footprint import CONTACT_DISTANCE_VOXELS, Footprint
 from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
 from cagefield.completion.surfaces.patch_bounds import SUPPORT_DISTANCE_VOXELS, patch_box
-from cagefield.completion.surfaces.plane_snapping import flattened
+from cagefield.completion.surfaces.plane_snapping import snap_to_planes
 from cagefield.completion.surfaces.support_plane import Support, find_support
 from cagefield.completion.surfaces.surfels import (
     Surfels,
@@ -40,18 +40,27 @@ LIGHT_SPACING_SHARE = 1.0 / 16.0
 """Maximum distance of these surfels as a share of the largest occlusion radius."""
 
 PROBE_DEPTH_VOXELS = 0.75
-"""How far beneath its surface what is looked at is of a part; voxels."""
+"""Depth beneath a surfel at which its membership in the part is tested, voxels."""
 
 MIN_LOG_CHANGE = 0.01
-"""The log of a change of light that is left out."""
+"""Minimum change of light (log); smaller ones are dropped."""
 
 
 @dataclass(frozen=True, eq=False)
 class EditContext:
-    """An edit's block: as it was, with V^c emptied, and masks [X,Y,Z] of V^c and of what was solid in it.
+    """Block around a discrete edit, before and after V^c is emptied.
 
-    settled: the part is shown at its new place, and casts its shadow there. apart: how far apart
-    light is worked out, world units; pasted: all surfaces with a paste, None of another edit.
+    Attributes:
+        edit: the edit.
+        region: the cage outside which the patch changes nothing.
+        before: the block as the edits below make it.
+        emptied: the block with V^c emptied.
+        inside: [X,Y,Z], mask of V^c.
+        part: [X,Y,Z], mask of the solid vertices in V^c.
+        include_destination: whether the part is shown at its new place, and casts its shadow there.
+        visibility: the field's visible surfaces; None if unknown, or if edits below move the field.
+        light_spacing: distance of the surfels on which light is computed, world units.
+        pasted: all surfels with a paste; None of another edit.
     """
 
     edit: Edit
@@ -60,188 +69,248 @@ class EditContext:
     emptied: GridBlock
     inside: Mask
     part: Mask
-    settled: bool
-    sight: CameraVisibility | None
-    apart: float
+    include_destination: bool
+    visibility: CameraVisibility | None
+    light_spacing: float
     pasted: Surfels | None = None
 
     @classmethod
-    def of(
+    def build(
         cls,
         field: VoxelField,
         below: EditStack,
         edit: Edit,
-        ambience: LightModel | None,
-        settled: bool,
+        model: LightModel | None,
+        include_destination: bool,
         preserve_opacity: bool,
         after: VoxelField | None,
-        sight: CameraVisibility | None,
+        visibility: CameraVisibility | None,
     ) -> EditContext:
-        # What is seen of the field itself is not where edits below have taken it.
-        sight = None if below.active else sight
-        settled = settled and not edit.deleted
+        # The field's visible surfaces are not where the edits below have moved them.
+        """Context of an edit of a field under the edits below.
+
+        model: the light model, None to leave light as it is; after: the field with a paste, if `edit` does
+        not hold its content.
+        """
+        visibility = None if below.active else visibility
+        include_destination = include_destination and not edit.deleted
         voxel = float(field.voxel_size.max())
-        lit = ambience if ambience is not None and ambience.shows else LightModel((), ())
-        apart = min(LIGHT_SPACING_VOXELS * voxel, LIGHT_SPACING_SHARE * lit.reach or np.inf)
-        box = patch_box(edit, voxel, lit.reach, settled=settled, falls=lit.falls)
+        active_model = model if model is not None and model.has_effect else LightModel((), ())
+        light_spacing = min(
+            LIGHT_SPACING_VOXELS * voxel, LIGHT_SPACING_SHARE * active_model.max_radius or np.inf
+        )
+        box = patch_box(
+            edit,
+            voxel,
+            active_model.max_radius,
+            include_destination=include_destination,
+            shadow_directions=active_model.shadow_directions,
+        )
         before = extract_block(field, below, box, preserve_opacity=preserve_opacity)
         region = Cage.box(box.mean(axis=0), box[1] - box[0] - 2.0 * voxel)
         if edit.source is not None:
-            shown, stack = (field, below.append(edit)) if after is None else (after, EditStack())
-            pasted = extract_surfels(extract_block(shown, stack, box, preserve_opacity=preserve_opacity))
+            shown_field, stack = (field, below.append(edit)) if after is None else (after, EditStack())
+            pasted = extract_surfels(
+                extract_block(shown_field, stack, box, preserve_opacity=preserve_opacity)
+            )
             none = np.zeros(before.shape, bool)
-            return cls(edit, region, before, before, none, none, settled, sight, apart, pasted)
+            return cls(
+                edit,
+                region,
+                before,
+                before,
+                none,
+                none,
+                include_destination,
+                visibility,
+                light_spacing,
+                pasted,
+            )
         inside = edit.inner.contains(before.positions(np.ones(before.shape, bool))).reshape(before.shape)
         emptied = before
         if not edit.keep_source:
-            # Below zero it is emptier than empty, which makes the surfaces beside it sharp.
+            # Keep negative densities: the trilinear zero crossing places the surface at sub-voxel precision.
             emptied = before.with_density(inside, np.minimum(before.density[inside], 0.0))
-        return cls(edit, region, before, emptied, inside, before.solid & inside, settled, sight, apart)
+        return cls(
+            edit,
+            region,
+            before,
+            emptied,
+            inside,
+            before.solid & inside,
+            include_destination,
+            visibility,
+            light_spacing,
+        )
 
     @cached_property
     def surface(self) -> Mask:
-        """Surface vertices outside of V^c."""
+        """Mask [X,Y,Z] of the surface vertices outside V^c."""
         return np.asarray(self.emptied.surface & ~self.inside)
 
     @cached_property
-    def rest_at(self) -> Array:
-        """Block coordinates [N,3] of the surfaces of all but the part."""
-        return self.before.coordinates(self.rest.points)
+    def remaining_coordinates(self) -> Array:
+        """Block coordinates [N,3] of the surfels in `remaining`."""
+        return self.before.block_coordinates(self.remaining.points)
 
-    def _away(self, mask: Mask, spacing: float = 1.0) -> Array:
-        """How far the surfaces of all but the part [N] are from the vertices of a mask [X,Y,Z]."""
+    def _distance_from(self, mask: Mask, spacing: float = 1.0) -> Array:
+        """Distances [N] of the surfels in `remaining` from the vertices of a mask [X,Y,Z]."""
         if not mask.any():
-            return np.full(len(self.rest_at), np.inf)
-        away = ndimage.distance_transform_edt(~mask, sampling=spacing)
-        return np.asarray(ndimage.map_coordinates(away, self.rest_at.T, order=1, mode="nearest"))
+            return np.full(len(self.remaining_coordinates), np.inf)
+        distance = ndimage.distance_transform_edt(~mask, sampling=spacing)
+        return np.asarray(
+            ndimage.map_coordinates(distance, self.remaining_coordinates.T, order=1, mode="nearest")
+        )
 
     @cached_property
-    def rim(self) -> NDArray[np.bool_]:
-        """Which of the surfaces of all but the part [N] are around V^c."""
+    def near_part(self) -> NDArray[np.bool_]:
+        """Mask [N] of the surfels in `remaining` around V^c."""
         size = float(np.median(self.edit.inner.aabb[1] - self.edit.inner.aabb[0]))
-        return np.asarray(self._away(self.inside) < max(SUPPORT_DISTANCE_VOXELS, 0.5 * size / self.voxel))
+        return np.asarray(
+            self._distance_from(self.inside) < max(SUPPORT_DISTANCE_VOXELS, 0.5 * size / self.voxel)
+        )
 
     @property
-    def close(self) -> Array:
-        """Block coordinates [N,3] of surfaces that the part hides from close by."""
-        return self.rest_at[self.rim & (self._away(self.part) < CONTACT_DISTANCE_VOXELS)]
+    def contact(self) -> Array:
+        """Block coordinates [N,3] of the surfels in `remaining` that the part hides by contact."""
+        return self.remaining_coordinates[
+            self.near_part & (self._distance_from(self.part) < CONTACT_DISTANCE_VOXELS)
+        ]
 
-    def support(self) -> Support | None:
-        """What the part stood on."""
-        return find_support(self.part, self.rest, self.rest_at, self.rim, self.voxel)
+    def find_support(self) -> Support | None:
+        """Support plane that the part stood on; None without one."""
+        return find_support(self.part, self.remaining, self.remaining_coordinates, self.near_part, self.voxel)
 
     @property
     def voxel(self) -> float:
-        """The longest edge of a voxel."""
+        """Longest edge of a voxel, world units."""
         return max(self.before.spacing)
 
     @cached_property
-    def _surface(self) -> tuple[Surfels, NDArray[np.bool_]]:
-        """(the surfaces before, which of them [N] are of the part)."""
+    def _surfels(self) -> tuple[Surfels, NDArray[np.bool_]]:
+        """(surfels before the edit, mask [N] of those of the part)."""
         surface = extract_surfels(self.before)
-        if self.sight is not None:
-            surface = prefer_visible(surface, self.sight.surface.within(self.before), self.voxel)
-        surface = surface.thinned(self.voxel)
-        within = surface.points - PROBE_DEPTH_VOXELS * self.voxel * surface.normals
-        return surface, np.asarray(self.edit.inner.contains(within) & (self.edit.source is None))
+        if self.visibility is not None:
+            surface = prefer_visible(surface, self.visibility.surface.crop_to_block(self.before), self.voxel)
+        surface = surface.downsample(self.voxel)
+        probes = surface.points - PROBE_DEPTH_VOXELS * self.voxel * surface.normals
+        return surface, np.asarray(self.edit.inner.contains(probes) & (self.edit.source is None))
 
     @cached_property
-    def rest(self) -> Surfels:
-        """The surfaces of all but the part; all, where that is kept."""
-        surface, _ = self._surface
-        return surface if self.edit.keep_source else self.others
+    def remaining(self) -> Surfels:
+        """Surfels after the removal: all without the part, or all where the edit keeps its source."""
+        surface, _ = self._surfels
+        return surface if self.edit.keep_source else self.surroundings
 
     @cached_property
-    def gone(self) -> Surfels:
-        """The surfaces of the part."""
-        surface, part = self._surface
+    def removed(self) -> Surfels:
+        """Surfels of the part."""
+        surface, part = self._surfels
         return surface.take(part)
 
     @cached_property
-    def others(self) -> Surfels:
-        """The surfaces of all but the part, also where that is kept."""
-        surface, part = self._surface
+    def surroundings(self) -> Surfels:
+        """Surfels of all but the part, also where the edit keeps its source."""
+        surface, part = self._surfels
         return surface.take(~part)
 
     @cached_property
-    def lit(self) -> Surfels:
-        """The rest as far apart as light is worked out."""
-        return self.rest.thinned(self.apart)
+    def light_surfels(self) -> Surfels:
+        """Surfels in `remaining`, downsampled to the spacing of the light."""
+        return self.remaining.downsample(self.light_spacing)
 
-    def without_part(self, ambience: LightModel) -> Array:
-        """By how much what is `lit` [N] is brighter (log) once the part is gone: not where that is kept."""
-        if self.edit.keep_source or not len(self.gone.points):
-            return np.zeros(len(self.lit.points))
+    def light_change_without_part(self, model: LightModel) -> Array:
+        """Log ratio of light [N] on `light_surfels` after the removal of the part; 0 where the source
+        stays.
+        """
+        if self.edit.keep_source or not len(self.removed.points):
+            return np.zeros(len(self.light_surfels.points))
         return _log_light_change(
-            ambience, self.lit, [self.rest], [self.rest, self.gone], self.gone, self.voxel
+            model,
+            self.light_surfels,
+            [self.remaining],
+            [self.remaining, self.removed],
+            self.removed,
+            self.voxel,
         )
 
-    def cast(
-        self, under: GridBlock, filled: Footprint | None, ambience: LightModel, strength: float
+    def light_change_at_destination(
+        self, under: GridBlock, footprint: Footprint | None, model: LightModel, strength: float
     ) -> tuple[LightChange, LightChange | None]:
-        """What the light on a block, and on the part, is multiplied by once the part is at its new place.
+        """(change of light on a block, change of light on the part or None) with the part at its
+        destination.
 
-        `under` is the block without the part, some of it `filled`. The part's shade on it has a strength. A
-        paste keeps its own light.
+        under: the block without the part; footprint: its inpainted columns; strength: of the part's shade
+        on it. A paste keeps its own light.
         """
-        rest = self.rest
-        if filled is not None:
-            points = filled.points(under)
-            made = Surfels(points, np.broadcast_to(filled.support.normal, points.shape))
-            rest = concatenate_surfels([rest.take(~filled.holds(self.rest_at)), made])
-        lit = rest.thinned(self.apart)
+        remaining = self.remaining
+        if footprint is not None:
+            points = footprint.points(under)
+            inpainted = Surfels(points, np.broadcast_to(footprint.support.normal, points.shape))
+            remaining = concatenate_surfels(
+                [remaining.take(~footprint.contains(self.remaining_coordinates)), inpainted]
+            )
+        light_surfels = remaining.downsample(self.light_spacing)
         if self.pasted is not None:
-            new = self.pasted.take(rest.distance(self.pasted.points) > 0.5 * self.voxel)
-            log = _log_light_change(ambience, lit, [rest, new], [rest], new, self.voxel)
-            return LightChange.of(under, lit, log, self.apart), None
-        part, moved = self._moved(self.gone)
-        # It is cut from what is solid: where it stood, it is no shell.
-        whole = concatenate_surfels([moved, self._moved(extract_cut_faces(self.before, self.edit.inner))[1]])
-        log = strength * _log_light_change(ambience, lit, [rest, whole], [rest], whole, self.voxel)
-        cast = LightChange.of(under, lit, log, self.apart)
-        before = [self.others, self.gone]
-        log = ambience.log_light([rest, whole], moved) - ambience.log_light(before, part)
+            added = self.pasted.take(remaining.distance(self.pasted.points) > 0.5 * self.voxel)
+            log = _log_light_change(model, light_surfels, [remaining, added], [remaining], added, self.voxel)
+            return LightChange.from_surfels(under, light_surfels, log, self.light_spacing), None
+        part, moved = self._move(self.removed)
+        # With its cut faces: the part is solid at its destination, not a shell.
+        whole = concatenate_surfels([moved, self._move(extract_cut_faces(self.before, self.edit.inner))[1]])
+        log = strength * _log_light_change(
+            model, light_surfels, [remaining, whole], [remaining], whole, self.voxel
+        )
+        change = LightChange.from_surfels(under, light_surfels, log, self.light_spacing)
+        before = [self.surroundings, self.removed]
+        log = model.log_light([remaining, whole], moved) - model.log_light(before, part)
         log = np.where(np.abs(log) < MIN_LOG_CHANGE, 0.0, log)
-        on_part = LightChange.of(self.before, part, log, self.apart)
-        where = on_part.where & self.inside
-        return cast, LightChange(where, on_part.log_ratio[self.inside[on_part.where]])
+        on_part = LightChange.from_surfels(self.before, part, log, self.light_spacing)
+        where = on_part.mask & self.inside
+        return change, LightChange(where, on_part.log_ratio[self.inside[on_part.mask]])
 
-    def _moved(self, surface: Surfels) -> tuple[Surfels, Surfels]:
-        """(what of a surface lies in V^c, the same at its new place)."""
+    def _move(self, surface: Surfels) -> tuple[Surfels, Surfels]:
+        """(surfels inside V^c, the same surfels at the destination)."""
         inside, points, jacobian = HexahedronMap(self.edit.deformed, self.edit.inner)(surface.points)
-        kept = surface.take(inside)
-        return kept, kept.turned(points, jacobian)
+        part = surface.take(inside)
+        return part, part.transform(points, jacobian)
 
-    def shown_part(self, block: GridBlock, there: GridBlock) -> GridBlock | None:
-        """The part, as it became in its block, put into `there`; no more has colours. None where it stays."""
-        feather = self.edit.feather if self.settled and self.edit.source is None else 0.0
+    def extract_part(self, block: GridBlock, destination: GridBlock) -> GridBlock | None:
+        """Block of the part as shown at its destination, feathered into `destination`; None if it is
+        unchanged.
+
+        Vertices away from the part have no color.
+        """
+        feather = self.edit.feather if self.include_destination and self.edit.source is None else 0.0
         if block is self.before and feather == 0.0:
             return None
         if feather > 0.0:
             edit = self.edit
-            block = feather_rim(block, there, edit.inner, edit.deformed, self.inside, feather)
-        kept = ndimage.binary_dilation(self.inside, iterations=2)
-        at = np.argwhere(kept)
-        part = replace(block, slot=np.where(kept, block.slot, -1))
-        return part.cropped(at.min(axis=0), at.max(axis=0)) if len(at) else part
+            block = feather_rim(block, destination, edit.inner, edit.deformed, self.inside, feather)
+        is_near = ndimage.binary_dilation(self.inside, iterations=2)
+        vertices = np.argwhere(is_near)
+        part = replace(block, slot=np.where(is_near, block.slot, -1))
+        return part.crop(vertices.min(axis=0), vertices.max(axis=0)) if len(vertices) else part
 
 
 def _log_light_change(
-    ambience: LightModel,
-    at: Surfels,
-    now: Sequence[Surfels],
+    model: LightModel,
+    surfels: Surfels,
+    after: Sequence[Surfels],
     before: Sequence[Surfels],
-    what: Surfels,
+    difference: Surfels,
     voxel: float,
 ) -> Array:
-    """By how much surface elements [N] are brighter (log) among some surfaces than among those before.
+    """Log ratio of the light [N] on surfels among the surfaces `after` to that among those `before`.
 
-    These differ in `what`, which makes no difference to openness from afar.
+    `difference` holds the surfels in which the two differ, which do not change openness far away.
     """
-    near = np.arange(len(at.points))
-    if ambience.sun is None:
-        near = np.flatnonzero(what.distance(at.points, 2.0 * ambience.reach) < 2.0 * ambience.reach)
-    rows, _ = flattened(at.take(near), voxel, edges=True)
-    log = np.zeros(len(at.points))
-    log[near] = ambience.log_light(now, rows) - ambience.log_light(before, rows)
+    near_rows = np.arange(len(surfels.points))
+    if model.directional is None:
+        near_rows = np.flatnonzero(
+            difference.distance(surfels.points, 2.0 * model.max_radius) < 2.0 * model.max_radius
+        )
+    rows, _ = snap_to_planes(surfels.take(near_rows), voxel, edges=True)
+    log = np.zeros(len(surfels.points))
+    log[near_rows] = model.log_light(after, rows) - model.log_light(before, rows)
     return np.where(np.abs(log) < MIN_LOG_CHANGE, 0.0, log)

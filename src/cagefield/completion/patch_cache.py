@@ -1,8 +1,8 @@
-"""What was worked out for a field and its edits, kept on disk for the next process.
+"""Disk cache of patches, light models and visibility, shared by processes.
 
-Each result is a file of arrays in the user's cache. Its name is a digest of all that the result follows
-from: the package's source, the field, its cameras, and what is asked for. A file that is damaged, missing or
-cannot be written costs the time of working it out again, and nothing else.
+Each result is a file of arrays in the user's cache. Its name is a digest of all inputs of the result: the
+package's source, the field, its cameras, and the arguments. A damaged, missing or unwritable file costs the
+time of the computation, and nothing else.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ from cagefield.files.user_cache import MAX_UNUSED_SECONDS, cache_root, source_di
 from cagefield.geometry.cage import Cage
 
 MIN_CACHED_SECONDS = 0.3
-"""What a result must have taken to be kept."""
+"""Minimum computation time of a result that is stored."""
 
 MAX_CACHE_BYTES = 1 << 30
-"""Room that all files take at most: those that were not used for longest go. One takes a quarter at most."""
+"""Maximum size of all files; those unused for longest are removed. One file takes a quarter at most."""
 
 MIN_FREE_BYTES = 1 << 30
-"""Room that stays free on the disk, at least."""
+"""Minimum free space on the disk after a file is written."""
 
 VERSIONS = source_digest(), np.__version__, scipy.__version__
-"""Of what works results out, as it was imported."""
+"""Versions of the code that computes results, as imported."""
 
 KINDS: Final = {
     kind.__name__: kind
@@ -70,67 +70,69 @@ KINDS: Final = {
         VoxelField,
     )
 }
-"""Classes that results consist of."""
+"""Classes in results."""
 
 Result = TypeVar("Result")
 
 
 class DiskCache:
-    """Results for one field, photographed by these cameras; see the module."""
+    """Results for one field and its cameras."""
 
     def __init__(self, field: VoxelField | SplatField, cameras: Sequence[Camera]) -> None:
         self._field, self._cameras = field, cameras
 
-    def get_or_make(self, what: Sequence[object], make: Callable[[], Result]) -> Result:
-        """What `make` gives: from disk, where it was made before for the same `what`.
+    def get_or_make(self, key: Sequence[object], make: Callable[[], Result]) -> Result:
+        """Result of `make`, from disk if it was computed before with the same inputs `key`.
 
-        `what` holds edits, cages, numbers and texts. What a paste has a part in is not kept.
+        `key` holds edits, cages, numbers and strings. Results with pastes are not stored.
         """
-        path = self._path(what)
+        path = self._path(key)
         if path is None:
             return make()
         with contextlib.suppress(OSError, ValueError):
             return cast(Result, self._read(path))
-        began = time.perf_counter()
-        made = make()
-        if time.perf_counter() - began > MIN_CACHED_SECONDS:
+        start = time.perf_counter()
+        result = make()
+        if time.perf_counter() - start > MIN_CACHED_SECONDS:
             with contextlib.suppress(OSError, ValueError, MemoryError):
-                self._write(path, made)
-        return made
+                self._write(path, result)
+        return result
 
     @cached_property
     def _base(self) -> bytes:
+        """Digest of the versions, the cameras and the field."""
         digest = hashlib.sha256()
         for each in (*VERSIONS, importlib.metadata.version("quadrants"), tuple(self._cameras)):
-            self._add(digest, each)
+            self._update_digest(digest, each)
         for name in (each.name for each in _init_fields(self._field)):
-            self._add(digest, getattr(self._field, name))
+            self._update_digest(digest, getattr(self._field, name))
         return digest.digest()
 
-    def _path(self, what: Sequence[object]) -> Path | None:
+    def _path(self, key: Sequence[object]) -> Path | None:
+        """Path of the file of a key; None if the key holds values without a digest."""
         digest = hashlib.sha256()
         try:
-            self._add(digest, tuple(what))
+            self._update_digest(digest, tuple(key))
             digest.update(self._base)
             return cache_root() / "patches" / f"{digest.hexdigest()[:32]}.npz"
         except (OSError, RuntimeError, TypeError):
             return None
 
     def _read(self, path: Path) -> object:
-        """Raises OSError where there is no file, ValueError for one that is damaged."""
+        """Result in a file. Raises OSError without the file, ValueError if it is damaged."""
         arrays = read_arrays(path)
         try:
-            found = self._unpacked(json.loads(arrays["tree"].tobytes()), arrays)
-        except Exception as error:  # classes of the package refuse in their own ways
+            result = self._unpack(json.loads(arrays["tree"].tobytes()), arrays)
+        except Exception as error:  # constructors of the classes raise errors of many kinds
             raise ValueError(str(error)) from error
         with contextlib.suppress(OSError):
             os.utime(path)
-        return found
+        return result
 
-    def _write(self, path: Path, made: object) -> None:
-        """Raises OSError without room, ValueError for what is too large or of other classes."""
+    def _write(self, path: Path, result: object) -> None:
+        """Write a result. Raises OSError without space, ValueError if it is too large or of another class."""
         arrays: dict[str, NDArray[Any]] = {}
-        tree = json.dumps(self._packed(made, arrays)).encode()
+        tree = json.dumps(self._pack(result, arrays)).encode()
         arrays["tree"] = np.frombuffer(tree, np.uint8)
         size = sum(values.nbytes for values in arrays.values())
         if size > MAX_CACHE_BYTES // 4:
@@ -143,8 +145,8 @@ class DiskCache:
             np.savez(temporary, **cast(Any, arrays))
         _evict_files(path.parent)
 
-    def _packed(self, value: Any, arrays: dict[str, NDArray[Any]]) -> Any:
-        """The value as JSON; its arrays are added to `arrays`, and named in it."""
+    def _pack(self, value: Any, arrays: dict[str, NDArray[Any]]) -> Any:
+        """JSON tree of a value; its arrays are added to `arrays` and named in the tree."""
         if value is self._field:
             return {"field": True}
         if value is None or isinstance(value, (bool, int, float, str)):
@@ -154,15 +156,16 @@ class DiskCache:
             arrays[name] = value
             return {"array": name}
         if isinstance(value, tuple):
-            return {"tuple": [self._packed(each, arrays) for each in value]}
+            return {"tuple": [self._pack(each, arrays) for each in value]}
         if type(value) is KINDS.get(type(value).__name__):
             values = {
-                each.name: self._packed(getattr(value, each.name), arrays) for each in _init_fields(value)
+                each.name: self._pack(getattr(value, each.name), arrays) for each in _init_fields(value)
             }
             return {"kind": type(value).__name__, "values": values}
         raise ValueError(f"{type(value)} is not kept")
 
-    def _unpacked(self, tree: Any, arrays: dict[str, NDArray[Any]]) -> Any:
+    def _unpack(self, tree: Any, arrays: dict[str, NDArray[Any]]) -> Any:
+        """Value of a JSON tree and its arrays."""
         if not isinstance(tree, dict):
             return tree
         if "field" in tree:
@@ -170,14 +173,14 @@ class DiskCache:
         if "array" in tree:
             return arrays[tree["array"]]
         if "tuple" in tree:
-            return tuple(self._unpacked(each, arrays) for each in tree["tuple"])
-        values = {name: self._unpacked(value, arrays) for name, value in tree["values"].items()}
+            return tuple(self._unpack(each, arrays) for each in tree["tuple"])
+        values = {name: self._unpack(value, arrays) for name, value in tree["values"].items()}
         return KINDS[tree["kind"]](**values)
 
-    def _add(self, digest: Any, value: object) -> None:
-        """Adds all that a value says; raises TypeError for what may say more: functions, what is pasted.
+    def _update_digest(self, digest: Any, value: object) -> None:
+        """Add all of a value except the names of edits to a digest.
 
-        What an edit is called says nothing.
+        Raises TypeError for a value that does not determine its content, such as a function or a paste.
         """
         if value is self._field:
             digest.update(b"field")
@@ -187,14 +190,14 @@ class DiskCache:
         elif isinstance(value, (tuple, list)):
             digest.update(f"({len(value)}".encode())
             for each in value:
-                self._add(digest, each)
+                self._update_digest(digest, each)
         elif dataclasses.is_dataclass(value) and not isinstance(value, type):
             if isinstance(value, Edit) and (value.pasted is not None or value.source is not None):
                 raise TypeError("what is pasted may change")
             digest.update(type(value).__name__.encode())
             for each in _init_fields(value):
                 if not (isinstance(value, Edit) and each.name == "name"):
-                    self._add(digest, getattr(value, each.name))
+                    self._update_digest(digest, getattr(value, each.name))
         elif value is None or isinstance(value, (bool, int, float, str, np.generic)):
             digest.update(f"<{value!r}>".encode())
         else:
@@ -202,18 +205,19 @@ class DiskCache:
 
 
 def _init_fields(value: Any) -> tuple[dataclasses.Field[Any], ...]:
+    """Fields of a dataclass that its constructor takes."""
     return tuple(each for each in dataclasses.fields(value) if each.init)
 
 
 def _evict_files(folder: Path) -> None:
-    """Removes what was not used for long, and what was not for longest where all take too much room."""
-    found = []
+    """Remove files unused for KEPT_SECONDS, and the least recently used ones beyond MAX_CACHE_BYTES."""
+    files = []
     for path in folder.glob("[!.]*.npz"):
         with contextlib.suppress(OSError):
             status = path.stat()
-            found.append((status.st_mtime, status.st_size, path))
+            files.append((status.st_mtime, status.st_size, path))
     room = MAX_CACHE_BYTES
-    for used, size, path in sorted(found, reverse=True):
+    for used, size, path in sorted(files, reverse=True):
         room -= size
         if room < 0 or time.time() - used > MAX_UNUSED_SECONDS:
             with contextlib.suppress(OSError):

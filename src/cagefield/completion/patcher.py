@@ -1,4 +1,4 @@
-"""Patches of one field's edits, made when they are asked for, and the last ones kept."""
+"""Patches of one field's edits, computed on demand, with a cache of the latest."""
 
 from __future__ import annotations
 
@@ -31,17 +31,16 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.images.render_result import RenderResult
 
 MAX_CACHED_PATCHES = 16
-"""Patches that are kept for when they are asked for again."""
+"""Maximum number of patches in memory."""
 
 Key = tuple[object, ...]
 
 
 class Patcher:
-    """Gives discrete edits the patches that their `fill` and `relight` ask for.
+    """Patches for the `fill` and `relight` options of edits of one field.
 
-    `cameras` are those that the field was photographed from: how contact shadows show is found in pictures
-    from there by `render`, which draws the field without edits, with normals. Pastes show what `pastes`
-    reads.
+    cameras: the cameras of the field's photos; the light model is fitted to images from there by `render`,
+    which renders the field without edits, with normals. pastes: the loader of the content of pastes.
     """
 
     def __init__(
@@ -52,13 +51,13 @@ class Patcher:
         pastes: PasteLoader | None = None,
     ) -> None:
         self._field, self._cameras, self._render, self._pastes = field, cameras, render, pastes
-        self._on_disk = DiskCache(field, cameras)
-        self._kept: OrderedDict[Key, Patch | SplatPatch | Edit | None] = OrderedDict()
-        self._around: tuple[Key, GridBlock] | None = None
-        self._suns: dict[tuple[float, float, float] | None, LightModel] = {}
-        self._pasted: OrderedDict[Key, Pasted] = OrderedDict()
+        self._disk_cache = DiskCache(field, cameras)
+        self._cache: OrderedDict[Key, Patch | SplatPatch | Edit | None] = OrderedDict()
+        self._light_block: tuple[Key, GridBlock] | None = None
+        self._directional_models: dict[tuple[float, float, float] | None, LightModel] = {}
+        self._composites: OrderedDict[Key, Pasted] = OrderedDict()
 
-    def patched(
+    def prepare(
         self,
         edits: Sequence[Edit],
         *,
@@ -67,19 +66,19 @@ class Patcher:
         preserve_opacity: bool = True,
         proceed: Callable[[], None] | None = None,
     ) -> EditStack:
-        """The stack of the edits, in order, with their patches.
+        """Stack of the edits, in order, with their patches and the content of their pastes.
 
-        Before a continuous edit that takes light along comes one of its own for that
-        (`completion.continuous_relighting`),
-        unless it is `moving`; with `bending` False there is none, and the stack is as long as the edits.
+        A continuous edit that relights is preceded by an edit with its light
+        (`completion.continuous_relighting`), except while `moving`; with `bending` False no such edit is
+        inserted, and the stack is as long as `edits`.
 
-        While an edit is `moving` its patch shows what it left, without the shadow of the part at its new
-        place: this does not depend on where that is. Edits that stay meanwhile keep the patches they have.
-        `proceed` is called between patches, and may raise.
+        While an edit is `moving` its patch omits the part's shadow at the destination and so does not
+        depend on the destination; an edit that stays meanwhile keeps its patch. `proceed` is called between
+        patches, and may raise to cancel.
 
-        Raises `EditError` for a paste of a scene that is not there, or that cannot be pasted.
+        Raises `EditError` for a paste whose scene is missing or cannot be pasted.
         """
-        made: list[Edit] = []
+        prepared: list[Edit] = []
         feathers = isinstance(self._field, VoxelField)
         if self._pastes is not None:
             edits = self._pastes.read(edits, self._field, preserve_opacity=preserve_opacity, proceed=proceed)
@@ -87,95 +86,106 @@ class Patcher:
             if edit.pasted is not None and isinstance(self._field, VoxelField):
                 if proceed is not None:
                     proceed()
-                edit = edit.replace(pasted=self._joined(tuple(made), edit, moving, preserve_opacity))
+                edit = edit.replace(pasted=self._composite(tuple(prepared), edit, moving, preserve_opacity))
             if needs_patch(edit, feathers=feathers):
                 if proceed is not None:
                     proceed()
-                patch = self._patch(tuple(made), edit, moving, preserve_opacity)
+                patch = self._patch(tuple(prepared), edit, moving, preserve_opacity)
                 edit = edit if patch is None else edit.replace(patch=patch)
             elif bending and not moving and needs_relighting(edit):
                 if proceed is not None:
                     proceed()
-                light = self._light(tuple(made), edit)
-                made += [] if light is None else [light]
-            made.append(edit)
-        while len(self._pasted) > max(MAX_CACHED_PATCHES, len(made)):
-            self._pasted.popitem(last=False)
-        return EditStack(made)
+                light = self._build_light(tuple(prepared), edit)
+                prepared += [] if light is None else [light]
+            prepared.append(edit)
+        while len(self._composites) > max(MAX_CACHED_PATCHES, len(prepared)):
+            self._composites.popitem(last=False)
+        return EditStack(prepared)
 
-    def _joined(
+    def _composite(
         self, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
     ) -> Pasted | None:
-        """What a paste shows; of one that moves, without what it is put over, unless that is known."""
-        assert isinstance(self._field, VoxelField)  # splats are put between others
+        """Content of a paste, composited with the field beneath; a moving one without the field, unless
+        cached.
+        """
+        assert isinstance(self._field, VoxelField)  # splats need no compositing
         stack = EditStack(below)
         key: Key = (*stack.active, edit.pasted, edit.deformed, preserve_opacity)
-        if key not in self._pasted:
+        if key not in self._composites:
             if moving:
                 return edit.pasted
-            self._pasted[key] = composite_paste(self._field, stack, edit, preserve_opacity=preserve_opacity)
-        self._pasted.move_to_end(key)
-        return self._pasted[key]
+            self._composites[key] = composite_paste(
+                self._field, stack, edit, preserve_opacity=preserve_opacity
+            )
+        self._composites.move_to_end(key)
+        return self._composites[key]
 
     @cached_property
-    def ambience(self) -> LightModel:
-        """How the field's colours follow its openness, and where its surfaces face."""
-        sight = self._sight  # whoever knows the light has it: drags do not wait for either
-        return self._on_disk.get_or_make(
-            ("ambience",),
-            lambda: with_diffuse_light(fit_light_model(self._voxels, sight), self._voxels, sight),
+    def light_model(self) -> LightModel:
+        """Light model of the field: openness and diffuse term."""
+        # Computed first: a cached light model implies a cached visibility, and drags wait for neither.
+        visibility = self._visibility
+        return self._disk_cache.get_or_make(
+            ("light_model",),
+            lambda: with_diffuse_light(
+                fit_light_model(self._voxel_field, visibility), self._voxel_field, visibility
+            ),
         )
 
-    def _lit(self, edit: Edit) -> LightModel | None:
-        """What goes along of the light of an edit; None where all stays."""
+    def _model_for(self, edit: Edit) -> LightModel | None:
+        """Light model for the `relight` option of an edit; None where light stays."""
         if edit.relight == "none":
             return None
         if edit.relight == "occlusion":
-            return self.ambience
+            return self.light_model
         direction = edit.relight.direction if isinstance(edit.relight, CastShadow) else None
-        if direction not in self._suns:
-            self._suns[direction] = self._on_disk.get_or_make(
+        if direction not in self._directional_models:
+            self._directional_models[direction] = self._disk_cache.get_or_make(
                 ("sun", direction),
-                lambda: with_directional_light(self.ambience, self._voxels, self._sight, direction),
+                lambda: with_directional_light(
+                    self.light_model, self._voxel_field, self._visibility, direction
+                ),
             )
-        return self._suns[direction]
+        return self._directional_models[direction]
 
     @cached_property
-    def _voxels(self) -> VoxelField:
-        """The field, or splats as coarsely as light is found out about."""
+    def _voxel_field(self) -> VoxelField:
+        """Voxel field, or splats voxelized at the resolution of the fit of a light model."""
         return self._field if isinstance(self._field, VoxelField) else voxelize_bounds(self._field)
 
     @cached_property
-    def _sight(self) -> CameraVisibility:
-        return self._on_disk.get_or_make(
+    def _visibility(self) -> CameraVisibility:
+        """Visibility of the field's surfaces."""
+        return self._disk_cache.get_or_make(
             ("sight",), lambda: render_visibility(self._render, self._cameras, self._field.bounds)
         )
 
     def _patch(
         self, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
     ) -> Patch | SplatPatch | None:
-        """The patch of an edit; None for one that wants none while it moves."""
+        """Patch of a discrete edit; None for an edit that needs none while it moves."""
         stack = EditStack(below)
-        # A drag does not wait for the light to be found out about.
-        known = not moving or "ambience" in self.__dict__
-        lit = self._lit(edit) if known else None
-        relit = lit is not None and lit.shows
-        if edit.source is not None and not relit:
+        # A drag does not wait for the fit of the light model.
+        model_known = not moving or "light_model" in self.__dict__
+        model_or_none = self._model_for(edit) if model_known else None
+        has_light = model_or_none is not None and model_or_none.has_effect
+        if edit.source is not None and not has_light:
             return None
         feather = edit.feather if isinstance(self._field, VoxelField) else 0.0
         kind = edit.deleted, edit.keep_source, edit.fill, feather, edit.pasted, preserve_opacity
-        what: Key = (*stack.active, edit.inner, *kind, relit and edit.relight)
-        settled: Key = (*what, edit.deformed if relit or feather > 0.0 else None)
-        key: Key = (*what, "moving") if moving and settled not in self._kept else settled
-        if key in self._kept:
-            self._kept.move_to_end(key)
-            return cast("Patch | SplatPatch", self._kept[key])
+        base_key: Key = (*stack.active, edit.inner, *kind, has_light and edit.relight)
+        final_key: Key = (*base_key, edit.deformed if has_light or feather > 0.0 else None)
+        key: Key = (*base_key, "moving") if moving and final_key not in self._cache else final_key
+        if key in self._cache:
+            self._cache.move_to_end(key)
+            return cast("Patch | SplatPatch", self._cache[key])
         if not needs_patch(edit, moving, feathers=isinstance(self._field, VoxelField)):
             return None
-        ambience = lit if relit else None
-        looks = relit or (edit.fill == "surroundings" and not edit.keep_source)
-
-        sight = self._sight if looks and (not moving or "_sight" in self.__dict__) else None
+        model = model_or_none if has_light else None
+        needs_visibility = has_light or (edit.fill == "surroundings" and not edit.keep_source)
+        visibility = (
+            self._visibility if needs_visibility and (not moving or "_visibility" in self.__dict__) else None
+        )
 
         def make() -> Patch | SplatPatch:
             if isinstance(self._field, VoxelField):
@@ -183,56 +193,61 @@ class Patcher:
                     self._field,
                     stack,
                     edit,
-                    ambience,
-                    settled=not moving,
-                    sight=sight,
+                    model,
+                    include_destination=not moving,
+                    visibility=visibility,
                     preserve_opacity=preserve_opacity,
                 )
-            return build_splat_patch(self._field, stack, edit, ambience, settled=not moving, sight=sight)
+            return build_splat_patch(
+                self._field, stack, edit, model, include_destination=not moving, visibility=visibility
+            )
 
-        follows_from = ("patch", ambience, *stack.active, edit, preserve_opacity)
-        patch = make() if moving else self._on_disk.get_or_make(follows_from, make)
-        self._keep(key, patch)
+        inputs = ("patch", model, *stack.active, edit, preserve_opacity)
+        patch = make() if moving else self._disk_cache.get_or_make(inputs, make)
+        self._store(key, patch)
         return patch
 
-    def _light(self, below: tuple[Edit, ...], edit: Edit) -> Edit | None:
-        """The edit that changes the light under a continuous one; None where none changes."""
-        lit = self._lit(edit)
-        if lit is None or not lit.shows:
+    def _build_light(self, below: tuple[Edit, ...], edit: Edit) -> Edit | None:
+        """Edit that changes the light under a continuous one; None if no light changes."""
+        model = self._model_for(edit)
+        if model is None or not model.has_effect:
             return None
         stack = EditStack(below)
         shape = edit.inner, edit.outer, edit.deformed, edit.shell, edit.falloff, edit.width
         key: Key = ("light", *stack.active, *shape, edit.allow_folding, edit.relight, edit.fill)
-        if key in self._kept:
-            self._kept.move_to_end(key)
-            return cast("Edit | None", self._kept[key])
+        if key in self._cache:
+            self._cache.move_to_end(key)
+            return cast("Edit | None", self._cache[key])
 
         def make() -> Patch | SplatPatch | None:
             if isinstance(self._field, VoxelField):
-                # While a cage is dragged again and again what is below it stays.
-                around: Key = (*stack.active, edit.outer, lit)
-                if self._around is None or self._around[0] != around:
-                    self._around = around, extract_bent_block(self._field, stack, edit, lit)
-                light = relight_voxels(self._field, stack, edit, lit, self._around[1], self._sight)
+                # The block below a cage stays the same over many drags of the cage.
+                block_key: Key = (*stack.active, edit.outer, model)
+                if self._light_block is None or self._light_block[0] != block_key:
+                    self._light_block = block_key, extract_bent_block(self._field, stack, edit, model)
+                light = relight_voxels(
+                    self._field, stack, edit, model, self._light_block[1], self._visibility
+                )
             else:
-                light = relight_splats(self._field, stack, edit, lit, self._sight)
+                light = relight_splats(self._field, stack, edit, model, self._visibility)
             return None if light is None else light.patch
 
-        patch = self._on_disk.get_or_make(("light", lit, *stack.active, edit), make)
+        patch = self._disk_cache.get_or_make(("light", model, *stack.active, edit), make)
         found = None if patch is None else light_edit(edit, patch)
-        self._keep(key, found)
+        self._store(key, found)
         return found
 
-    def _keep(self, key: Key, found: Patch | SplatPatch | Edit | None) -> None:
-        self._kept[key] = found
-        while len(self._kept) > MAX_CACHED_PATCHES:
-            self._kept.popitem(last=False)
+    def _store(self, key: Key, value: Patch | SplatPatch | Edit | None) -> None:
+        """Store a patch, and drop the oldest beyond MAX_CACHED_PATCHES."""
+        self._cache[key] = value
+        while len(self._cache) > MAX_CACHED_PATCHES:
+            self._cache.popitem(last=False)
 
 
 def needs_patch(edit: Edit, moving: bool = False, *, feathers: bool = True) -> bool:
-    """True for an edit that is shown, and leaves something to be filled or put into another light.
+    """Whether an enabled discrete edit leaves something to inpaint, to relight or to feather.
 
-    `feathers`: or that has a seam, which splats have not.
+    `feathers`: whether the field's kind has seams to feather; splats have none.
     """
     if edit.adjustment != "discrete" or not (edit.enabled and edit.changes_anything):
         return False
@@ -243,7 +258,7 @@ def needs_patch(edit: Edit, moving: bool = False, *, feathers: bool = True) -> b
 
 
 def needs_relighting(edit: Edit) -> bool:
-    """True for a continuous edit that is shown and takes light along."""
+    """Whether an edit is an enabled, possible continuous one that relights."""
     return (
         edit.adjustment == "continuous"
         and edit.enabled

@@ -1,10 +1,9 @@
-"""The patch of one edit of splats: worked out on a grid, and given back to splats.
+"""Patch of one edit of splats: computed on a voxel grid, and transferred back to splats.
 
-The splats around the edit are put on a voxel grid (`completion.surfaces.splat_voxelization`), where fill and
-light are worked out
-as for voxel fields (`completion.discrete_patch`, `completion.continuous_relighting`). What the
-light is multiplied by is looked up at the
-splats' means. What was filled is laid out with new splats (`completion.inpainting.splat_inpainting`).
+The splats around the edit are voxelized (`completion.surfaces.splat_voxelization`); inpainting and
+relighting work on the grid as for voxel fields (`completion.discrete_patch`,
+`completion.continuous_relighting`). The change of light is interpolated at the means of the splats;
+inpainted surfaces get new splats (`completion.inpainting.splat_inpainting`).
 """
 
 from __future__ import annotations
@@ -39,86 +38,107 @@ from cagefield.rendering.splats.splat_provenance import with_pasted
 from cagefield.typing import AnyArray, Array, Mask
 
 MIN_FILL_DIFFERENCE = 0.2
-"""Splats stay where what was filled has the density that was there, and coefficients that differ by less."""
+"""Minimum change of spherical-harmonics coefficients, at unchanged density, for which splats are replaced."""
 
 
 def build_splat_patch(
     field: SplatField,
     below: EditStack,
     edit: Edit,
-    ambience: LightModel | None,
+    model: LightModel | None,
     *,
-    settled: bool = True,
-    sight: CameraVisibility | None = None,
+    include_destination: bool = True,
+    visibility: CameraVisibility | None = None,
 ) -> SplatPatch:
-    """The patch of a discrete edit of splats under the edits below it; arguments as for `making.made_of`."""
-    # Splats overlap: their seams are soft.
+    """Patch of a discrete edit of splats under the edits below; arguments as in `compute_patch`."""
+    # No feathering: splats overlap, and their seams are soft.
     edit = edit.replace(feather=0.0)
     field = with_pasted(field, below.append(edit))
-    lit = ambience if ambience is not None and ambience.shows else LightModel((), ())
-    place = settled and not edit.deleted
+    active_model = model if model is not None and model.has_effect else LightModel((), ())
+    to_destination = include_destination and not edit.deleted
     moved = _crop_splats(
         field,
         moved_splats(field, below),
-        _include_clone_source(edit, patch_box(edit, 0.0, lit.reach, falls=lit.falls)),
+        _include_clone_source(
+            edit,
+            patch_box(edit, 0.0, active_model.max_radius, shadow_directions=active_model.shadow_directions),
+        ),
     )
     splats = where_they_are(field, moved)
-    voxel = choose_voxel_size(splats, patch_box(edit, 0.0, lit.reach, settled=place, falls=lit.falls))
-    box = patch_box(edit, voxel, lit.reach, settled=place, falls=lit.falls) + 3.0 * voxel * np.array(
-        [[-1.0], [1.0]]
+    voxel = choose_voxel_size(
+        splats,
+        patch_box(
+            edit,
+            0.0,
+            active_model.max_radius,
+            include_destination=to_destination,
+            shadow_directions=active_model.shadow_directions,
+        ),
     )
+    box = patch_box(
+        edit,
+        voxel,
+        active_model.max_radius,
+        include_destination=to_destination,
+        shadow_directions=active_model.shadow_directions,
+    ) + 3.0 * voxel * np.array([[-1.0], [1.0]])
     grid = voxelize_splats(splats, _include_clone_source(edit, box), voxel)
     after = None
     if edit.source is not None:
         pasted = _crop_splats(field, moved_splats(field, below.append(edit)), box)
         after = voxelize_splats(where_they_are(field, pasted), _include_clone_source(edit, box), voxel)
-    made = compute_patch(
-        grid, EditStack(), edit, ambience, settled=settled, sight=None if below.active else sight, after=after
+    result = compute_patch(
+        grid,
+        EditStack(),
+        edit,
+        model,
+        include_destination=include_destination,
+        visibility=None if below.active else visibility,
+        after=after,
     )
-    known, new = KnownSplats.of(field, splats, grid, moved), NO_SPLATS
-    fresh = made.under.differs(made.emptied, MIN_FILL_DIFFERENCE)
+    known, new = KnownSplats.from_moved(field, splats, grid, moved), NO_SPLATS
+    is_new = result.under.changed_from(result.emptied, MIN_FILL_DIFFERENCE)
     if isinstance(edit.fill, Clone) and not edit.keep_source:
-        new = known.cloned(made.under, edit.inner, edit.fill.source)
-    elif made.support is not None:
-        new = known.filled(made.under, fresh, made.work.region, edit.inner, made.support)
-    part = None if made.part_light is None else _to_new_light(made.before, made.part_light)
-    light = _to_new_light(made.under, made.light)
-    return known.patch(field, made.work.region, fresh & ~made.inside, light, part, new)
+        new = known.clone_cage(result.under, edit.inner, edit.fill.source)
+    elif result.support is not None:
+        new = known.fill_surface(result.under, is_new, result.context.region, edit.inner, result.support)
+    part = None if result.part_light is None else _to_new_light(result.before, result.part_light)
+    light = _to_new_light(result.under, result.light)
+    return known.build_patch(field, result.context.region, is_new & ~result.inside, light, part, new)
 
 
 def relight_splats(
     field: SplatField,
     below: EditStack,
     edit: Edit,
-    ambience: LightModel,
-    sight: CameraVisibility | None = None,
+    model: LightModel,
+    visibility: CameraVisibility | None = None,
 ) -> Edit:
-    """The edit that changes the light of splats under a continuous edit
-    (`completion.continuous_relighting`)."""
+    """Edit that changes the light of splats under a continuous edit (`completion.continuous_relighting`)."""
     field = with_pasted(field, below)
-    box = light_box(edit, 0.0, ambience.reach, ambience.falls)
+    box = light_box(edit, 0.0, model.max_radius, model.shadow_directions)
     moved = _crop_splats(field, moved_splats(field, below), box)
     splats = where_they_are(field, moved)
     voxel = choose_voxel_size(splats, box)
-    box = light_box(edit, voxel, ambience.reach, ambience.falls)
+    box = light_box(edit, voxel, model.max_radius, model.shadow_directions)
     region, grid = Cage.box(box.mean(axis=0), box[1] - box[0]), voxelize_splats(splats, box, voxel)
     block = extract_block(grid, EditStack(), box)
-    bent = compute_bent_light(block, edit, ambience)
+    bent = compute_bent_light(block, edit, model)
     relit, light = apply_bent_light(block, bent)
-    known = KnownSplats.of(field, splats, grid, moved)
-    new, gone = NO_SPLATS, np.zeros(block.shape, bool)
+    known = KnownSplats.from_moved(field, splats, grid, moved)
+    new, is_new = NO_SPLATS, np.zeros(block.shape, bool)
     if edit.fill == "surroundings":
         under, support = inpaint_shaded_support(
-            relit, edit, bent, EditStack(), None if below.active else sight
+            relit, edit, bent, EditStack(), None if below.active else visibility
         )
         if support is not None:
-            gone = under.differs(relit, MIN_FILL_DIFFERENCE)
-            new = known.filled(under, gone, region, edit.inner, support)
-    return light_edit(edit, known.patch(field, region, gone, _to_new_light(block, light), None, new))
+            is_new = under.changed_from(relit, MIN_FILL_DIFFERENCE)
+            new = known.fill_surface(under, is_new, region, edit.inner, support)
+    return light_edit(edit, known.build_patch(field, region, is_new, _to_new_light(block, light), None, new))
 
 
 def _include_clone_source(edit: Edit, box: Array) -> Array:
-    """A box [2,3], grown by the cage that an edit clones."""
+    """Box [2,3] that holds a box [2,3] and the cage that an edit clones."""
     if not isinstance(edit.fill, Clone):
         return box
     source = edit.fill.source.aabb
@@ -126,19 +146,19 @@ def _include_clone_source(edit: Edit, box: Array) -> Array:
 
 
 def _crop_splats(field: SplatField, moved: MovedSplats, box: Array) -> MovedSplats:
-    """Those of a field's splats that may reach into a box [2,3], half as large again."""
+    """Splats whose extent reaches into a box [2,3] enlarged by half."""
     box = box + 0.25 * (box[1] - box[0]) * np.array([[-1.0], [1.0]])
 
     def reaches(points: AnyArray, rows: NDArray[np.int64] | slice) -> Mask:
         reach = 3.0 * np.exp(field.log_scales[rows].max(axis=1, keepdims=True))
         return np.asarray(((points + reach >= box[0]) & (points - reach <= box[1])).all(axis=1))
 
-    here = reaches(moved.points, moved.source)
-    gains = None if moved.gains is None else moved.gains[here]
+    is_near = reaches(moved.points, moved.source)
+    gains = None if moved.gains is None else moved.gains[is_near]
     left = moved.left | ~reaches(field.means, slice(None))
-    return MovedSplats(left, moved.source[here], moved.points[here], moved.jacobian[here], gains)
+    return MovedSplats(left, moved.source[is_near], moved.points[is_near], moved.jacobian[is_near], gains)
 
 
 def _to_new_light(block: GridBlock, light: LightChange | None) -> NewLight:
-    """The light on a block; none at all where it stays."""
-    return (light or LightChange(np.zeros(block.shape, bool), np.zeros(0))).on_grid(block)
+    """Change of light on a block for splats; without values where light stays."""
+    return (light or LightChange(np.zeros(block.shape, bool), np.zeros(0))).to_new_light(block)

@@ -80,8 +80,8 @@ def path_edits(
     if times is None:
         return None
     kept = renderer.preserve_opacity
-    on_way = for_pages(patcher.patched(edits.edits, moving=True, preserve_opacity=kept))
-    edits = for_pages(patcher.patched(edits.edits, preserve_opacity=kept, bending=False))
+    on_way = for_pages(patcher.prepare(edits.edits, moving=True, preserve_opacity=kept))
+    edits = for_pages(patcher.prepare(edits.edits, preserve_opacity=kept, bending=False))
     knots = [parts_at(line, edits, t) for t in times]
     unique = list(dict.fromkeys(knots))
     moving = [n for n in range(len(edits)) if len({parts[n] for parts in unique}) > 1]

@@ -38,7 +38,7 @@ def splat_path_edits(
     if len(keys) < 2:
         return None
 
-    on_way, edits = patcher.patched(edits.edits, moving=True), patcher.patched(edits.edits, bending=False)
+    on_way, edits = patcher.prepare(edits.edits, moving=True), patcher.prepare(edits.edits, bending=False)
     # With all that is pasted, also in states without it.
     field = with_pasted(field, edits)
 

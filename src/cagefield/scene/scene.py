@@ -405,7 +405,7 @@ class Scene:
 
         # Patches are voxels: too rough for what a continuous edit bends, and for parts with soft seams.
         edits = [edit.replace(feather=0.0) if edit.feather else edit for edit in self.edits]
-        patched = self.patcher.patched(edits, bending=False)
+        patched = self.patcher.prepare(edits, bending=False)
         exact = EditStack(edit.replace(lattice=None) for edit in patched)
         return render_nerf(
             original,
@@ -444,7 +444,7 @@ class Scene:
     @property
     def patched_edits(self) -> EditStack:
         """The edits with the patches that they ask for. Raises EditError for a paste that is not possible."""
-        return self.patcher.patched(self.edits.edits, preserve_opacity=self.preserve_opacity)
+        return self.patcher.prepare(self.edits.edits, preserve_opacity=self.preserve_opacity)
 
     @cached_property
     def up(self) -> Array:

@@ -1,1 +1,1 @@
-"""Inpainting of what an edit uncovers."""
+"""Inpainting of uncovered surfaces, and blending of moved parts."""

@@ -1,8 +1,8 @@
-"""V^c filled with the content of another cage, blended in gradients at the rim.
+"""Cloning: V^c filled with the content of a source cage, blended in gradients at the rim.
 
-The content of the source cage is read through the map of V^c onto it. Its colours differ from those of the
-surfaces around V^c; the differences at the rim, spread over V^c, are added, each vertex taking the mean of
-the nearest ones weighted by 1 / distance^2: an approximation of the membrane that solves Laplace's equation.
+The content is read through the map of V^c onto the source cage. Its colors differ from those of the
+surfaces around V^c. The differences at the rim are interpolated over V^c with weights 1 / distance^2 of the
+nearest ones, and added: an approximation of the membrane that solves Laplace's equation.
 
 Source: Farbman et al., "Coordinates for instant image cloning" (2009).
 """
@@ -20,7 +20,7 @@ from cagefield.typing import Mask
 from cagefield.warps.hexahedron_map import HexahedronMap
 
 RIM_NEIGHBORS = 24
-"""Differences at the rim that a vertex takes the mean of."""
+"""Number of differences at the rim that a vertex averages."""
 
 
 def clone_cage(
@@ -31,48 +31,50 @@ def clone_cage(
     surface: Mask,
     preserve_opacity: bool = True,
 ) -> GridBlock:
-    """The block with the vertices in V^c, `inside` [X,Y,Z], showing what is in the source cage.
+    """Block with the content of a source cage in V^c, `inside` [X,Y,Z].
 
-    cages: (V^c, the source cage). surface [X,Y,Z]: the surface vertices around V^c, to whose colours it is
-    blended. `preserve_opacity` as for `block_of`.
+    cages: (V^c, source cage). surface [X,Y,Z]: mask of the surface vertices around V^c, to whose colors the
+    content is blended. `preserve_opacity` as in `extract_block`.
     """
     inner, source = cages
-    where = np.asarray(inside)
-    points = block.positions(where)
-    within, found, jacobian = HexahedronMap(source, inner)(points)
+    mask = np.asarray(inside)
+    points = block.positions(mask)
+    is_mapped, source_points, jacobian = HexahedronMap(source, inner)(points)
     density, sh = np.zeros(len(points), np.float32), np.zeros((len(points), *block.sh.shape[1:]), np.float32)
-    turn = np.asarray(np.linalg.inv(jacobian), np.float64)
-    density[within], sh[within] = sample_edited_field(
-        block.field, below, found, turn, preserve_opacity=preserve_opacity
+    inverse_jacobian = np.asarray(np.linalg.inv(jacobian), np.float64)
+    density[is_mapped], sh[is_mapped] = sample_edited_field(
+        block.field, below, source_points, inverse_jacobian, preserve_opacity=preserve_opacity
     )
-    filled = block.with_density(where, density, slots=True)
+    filled = block.with_density(mask, density, slots=True)
     coefficients = filled.sh.copy()
-    rows = filled.slot[where]
+    rows = filled.slot[mask]
     coefficients[rows] = sh
     filled = GridBlock(block.field, block.low, filled.density, filled.slot, coefficients)
-    # Pairs across the faces of V^c, both of them at a surface.
+    # Pairs of surface vertices across the faces of V^c.
     rim = ndimage.binary_dilation(inside, iterations=2) & surface
     solid = filled.solid
-    facing = ndimage.binary_dilation(rim, iterations=3) & inside & solid & ndimage.binary_dilation(~solid)
-    at, to = np.argwhere(facing), np.argwhere(rim)
-    if not len(at) or not len(to):
+    inner_rim = ndimage.binary_dilation(rim, iterations=3) & inside & solid & ndimage.binary_dilation(~solid)
+    inner_vertices, rim_vertices = np.argwhere(inner_rim), np.argwhere(rim)
+    if not len(inner_vertices) or not len(rim_vertices):
         return filled
-    _, nearest = cKDTree(to).query(at)
-    # Upper sides go on with upper sides, not with what lies under them.
-    along = filled.normals
-    alike = (along[tuple(at.T)] * along[tuple(to[nearest].T)]).sum(axis=1) > 0.3
-    at, nearest = at[alike], nearest[alike]
-    if not len(at):
+    _, nearest = cKDTree(rim_vertices).query(inner_vertices)
+    # Pair surfaces of one side: an upper side continues an upper side.
+    normals = filled.normals
+    faces_alike = (normals[tuple(inner_vertices.T)] * normals[tuple(rim_vertices[nearest].T)]).sum(
+        axis=1
+    ) > 0.3
+    inner_vertices, nearest = inner_vertices[faces_alike], nearest[faces_alike]
+    if not len(inner_vertices):
         return filled
     width = int(np.prod(sh.shape[1:]))
-    own = coefficients[filled.slot[tuple(at.T)]].reshape(-1, width)
-    there = coefficients[filled.slot[tuple(to[nearest].T)]].reshape(-1, width)
-    places = np.argwhere(where)
-    count = min(RIM_NEIGHBORS, len(at))
-    distance, chosen = cKDTree(at).query(places, k=[*range(1, count + 1)])
-    facing_same = np.einsum("nc,nkc->nk", along[where], along[tuple(at.T)][chosen])
-    weight = np.maximum(facing_same, 0.01) / np.maximum(distance, 0.5) ** 2
+    inner_sh = coefficients[filled.slot[tuple(inner_vertices.T)]].reshape(-1, width)
+    rim_sh = coefficients[filled.slot[tuple(rim_vertices[nearest].T)]].reshape(-1, width)
+    vertices = np.argwhere(mask)
+    count = min(RIM_NEIGHBORS, len(inner_vertices))
+    distance, neighbors = cKDTree(inner_vertices).query(vertices, k=[*range(1, count + 1)])
+    cosine = np.einsum("nc,nkc->nk", normals[mask], normals[tuple(inner_vertices.T)][neighbors])
+    weight = np.maximum(cosine, 0.01) / np.maximum(distance, 0.5) ** 2
     weight /= weight.sum(axis=1, keepdims=True)
-    added = np.einsum("nk,nkc->nc", weight, (there - own)[chosen])
-    coefficients[rows] += added.reshape(sh.shape).astype(np.float32)
+    correction = np.einsum("nk,nkc->nc", weight, (rim_sh - inner_sh)[neighbors])
+    coefficients[rows] += correction.reshape(sh.shape).astype(np.float32)
     return filled

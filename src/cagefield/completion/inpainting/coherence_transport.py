@@ -1,9 +1,9 @@
-"""Grain goes on through a hole: colours that come along the lines of a texture from both sides of it.
+"""Coherence transport: colors carried into a hole along the lines of a texture, from both sides.
 
-The structure tensor of the colours around, spanned over the hole by a membrane, has the direction of the
-lines there, and how alike they are: 1 for wood's grain or stripes, near 0 for spots and noise. Every column
-of the hole is followed along the lines to the hole's rim, both ways, and mixes what is there by nearness.
-The more alike lines are, the more that counts against the membrane of the colours themselves.
+The structure tensor of the colors around the hole, extended over the hole by a membrane, gives the
+orientation of the lines there and their coherence: 1 for wood grain or stripes, near 0 for spots and noise.
+Each column of the hole is traced along the lines to the hole's rim, both ways; the colors at both ends are
+averaged with inverse lengths as weights. Coherence weights the result against the membrane of the colors.
 
 Source: Bornemann and März, "Fast image inpainting based on coherence transport" (2007), for the idea;
 Weickert, "Anisotropic diffusion in image processing" (1998), section 2.2, for the structure tensor.
@@ -27,32 +27,32 @@ TENSOR_DEVIATION_COLUMNS = 3.0
 """Standard deviation of the Gaussian that smooths the structure tensor, columns."""
 
 LINE_STEP_COLUMNS = 0.5
-"""Columns from one point of a line to the next."""
+"""Step of a traced line, columns."""
 
 RIM_SAMPLE_COLUMNS = 12
-"""Columns beyond the rim whose mean is what a line brings along."""
+"""Columns beyond the rim over which the color at the end of a line is averaged."""
 
 MAX_LINE_HOLE_SIZES = 3.0
-"""Lines that go on for longer than so many times the hole's size lead nowhere."""
+"""Maximum length of a line, in sizes of the hole."""
 
 
 @dataclass(frozen=True, eq=False)
 class TextureOrientation:
-    """Unit directions [U,V,2] of the lines of a texture, and how alike these are [U,V]: 0 to 1."""
+    """Unit directions [U,V,2] of the lines of a texture, and their coherence [U,V], 0 to 1."""
 
-    along: Array
-    alike: Array
+    direction: Array
+    coherence: Array
 
 
 def estimate_orientation(
     values: Array, given: Mask, span: Callable[[Mask, Array], Array]
 ) -> TextureOrientation:
-    """The grain of values [U,V] where they are given [U,V], and beyond, by a membrane `span`."""
+    """Orientation of the texture of values [U,V] given on a mask [U,V], extended by a membrane `span`."""
     smooth = smooth_columns(values[..., None], given)[..., 0]
     slope = np.stack([np.gradient(smooth, axis=axis) for axis in (0, 1)], axis=-1)
-    whole = ndimage.binary_erosion(given, np.ones((3, 3), bool))
-    tensor = np.einsum("uvi,uvj->uvij", slope, slope)[..., (0, 0, 1), (0, 1, 1)] * whole[..., None]
-    share = ndimage.gaussian_filter(whole.astype(np.float64), TENSOR_DEVIATION_COLUMNS)
+    interior = ndimage.binary_erosion(given, np.ones((3, 3), bool))
+    tensor = np.einsum("uvi,uvj->uvij", slope, slope)[..., (0, 0, 1), (0, 1, 1)] * interior[..., None]
+    share = ndimage.gaussian_filter(interior.astype(np.float64), TENSOR_DEVIATION_COLUMNS)
     tensor = (
         ndimage.gaussian_filter(tensor, (TENSOR_DEVIATION_COLUMNS, TENSOR_DEVIATION_COLUMNS, 0.0))
         / np.maximum(share, 1e-6)[..., None]
@@ -63,44 +63,44 @@ def estimate_orientation(
     a, b, c = np.moveaxis(span(known, tensor.reshape(-1, 3)).reshape(*given.shape, 3), -1, 0)
     # The larger eigenvector is across the lines.
     angle = 0.5 * np.arctan2(2.0 * b, a - c) + 0.5 * np.pi
-    apart = (a - c) ** 2 + 4.0 * b**2
-    alike = apart / np.maximum((a + c) ** 2, 1e-30)
-    return TextureOrientation(np.stack([np.cos(angle), np.sin(angle)], axis=-1), np.clip(alike, 0.0, 1.0))
+    anisotropy = (a - c) ** 2 + 4.0 * b**2
+    coherence = anisotropy / np.maximum((a + c) ** 2, 1e-30)
+    return TextureOrientation(np.stack([np.cos(angle), np.sin(angle)], axis=-1), np.clip(coherence, 0.0, 1.0))
 
 
 def smooth_columns(values: Array, given: Mask) -> Array:
-    """Values [U,V,C] of columns, each a mean of those nearby that are given [U,V]."""
+    """Gaussian average [U,V,C] of the values of given columns [U,V]."""
     share = ndimage.gaussian_filter(given.astype(np.float64), COLOR_DEVIATION_COLUMNS)[..., None]
-    own = np.where(given[..., None], values, 0.0)
+    given_values = np.where(given[..., None], values, 0.0)
     return np.asarray(
-        ndimage.gaussian_filter(own, (COLOR_DEVIATION_COLUMNS, COLOR_DEVIATION_COLUMNS, 0.0))
+        ndimage.gaussian_filter(given_values, (COLOR_DEVIATION_COLUMNS, COLOR_DEVIATION_COLUMNS, 0.0))
         / np.maximum(share, 1e-6)
     )
 
 
 def transport_colors(
-    unknown: Mask, given: Mask, table: Array, grain: TextureOrientation
+    unknown: Mask, given: Mask, table: Array, orientation: TextureOrientation
 ) -> tuple[Array, Array]:
-    """(rows [M,C] for the unknown columns, how much they count [M]: 0 where a line has no two ends).
+    """(rows [M,C] of the unknown columns, their weights [M]: coherence, or 0 for a line without two ends).
 
-    unknown, given [U,V]; table [U*V,C].
+    unknown, given: masks [U,V]; table [U*V,C]: values.
     """
     start = np.argwhere(unknown)
-    longest = MAX_LINE_HOLE_SIZES * (np.sqrt(len(start)) + 1.0)
-    lines = [_trace_lines(start, sign, given, grain, longest) for sign in (1.0, -1.0)]
-    ended = np.flatnonzero(np.isfinite(lines[0].length) & np.isfinite(lines[1].length))
+    max_length = MAX_LINE_HOLE_SIZES * (np.sqrt(len(start)) + 1.0)
+    lines = [_trace_lines(start, sign, given, orientation, max_length) for sign in (1.0, -1.0)]
+    complete = np.flatnonzero(np.isfinite(lines[0].length) & np.isfinite(lines[1].length))
     rows, total = np.zeros((len(start), table.shape[1])), np.zeros(len(start))
     for line in lines:
-        weight = 1.0 / np.maximum(line.length[ended], 0.5)
-        rows[ended] += weight[:, None] * _rim_means(line, ended, given, table)
-        total[ended] += weight
-    rows[ended] /= total[ended][:, None]
-    return rows, np.where(total > 0.0, grain.alike[unknown], 0.0)
+        weight = 1.0 / np.maximum(line.length[complete], 0.5)
+        rows[complete] += weight[:, None] * _rim_means(line, complete, given, table)
+        total[complete] += weight
+    rows[complete] /= total[complete][:, None]
+    return rows, np.where(total > 0.0, orientation.coherence[unknown], 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class _Lines:
-    """Where lines end [M,2], their lengths [M], inf of those that lead nowhere, and headings [M,2] there."""
+    """Ends [M,2] of lines, lengths [M] (inf for a line without an end), and headings [M,2] at the ends."""
 
     end: Array
     length: Array
@@ -108,29 +108,31 @@ class _Lines:
 
 
 def _trace_lines(
-    start: NDArray[np.int64], sign: float, given: Mask, grain: TextureOrientation, longest: float
+    start: NDArray[np.int64], sign: float, given: Mask, orientation: TextureOrientation, max_length: float
 ) -> _Lines:
-    """Lines from columns [M,2] to what is given [U,V]."""
-    at, heading = start.astype(np.float64), sign * grain.along[tuple(start.T)]
-    length, going = np.full(len(start), np.inf), np.arange(len(start))
-    for number in range(int(longest / LINE_STEP_COLUMNS)):
-        cell = np.round(at[going]).astype(np.int64)
+    """Lines from columns [M,2] along a sign of the orientation to the given columns [U,V]."""
+    positions, heading = start.astype(np.float64), sign * orientation.direction[tuple(start.T)]
+    length, active = np.full(len(start), np.inf), np.arange(len(start))
+    for number in range(int(max_length / LINE_STEP_COLUMNS)):
+        cell = np.round(positions[active]).astype(np.int64)
         inside = ((cell >= 0) & (cell < given.shape)).all(axis=1)
-        going, cell = going[inside], cell[inside]
-        along = grain.along[tuple(cell.T)]
-        along = along * np.where((along * heading[going]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
-        heading[going] = along
-        there = given[tuple(cell.T)]
-        length[going[there]] = LINE_STEP_COLUMNS * number
-        going = going[~there]
-        if not len(going):
+        active, cell = active[inside], cell[inside]
+        direction = orientation.direction[tuple(cell.T)]
+        direction = direction * np.where((direction * heading[active]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
+        heading[active] = direction
+        has_ended = given[tuple(cell.T)]
+        length[active[has_ended]] = LINE_STEP_COLUMNS * number
+        active = active[~has_ended]
+        if not len(active):
             break
-        at[going] += LINE_STEP_COLUMNS * heading[going]
-    return _Lines(at, length, heading)
+        positions[active] += LINE_STEP_COLUMNS * heading[active]
+    return _Lines(positions, length, heading)
 
 
 def _rim_means(lines: _Lines, which: NDArray[np.int64], given: Mask, table: Array) -> Array:
-    """Means [N,C] of what is given from the ends of some lines [N] on, straight along their headings."""
+    """Mean values [N,C] of the given columns beyond the ends of some lines [N], straight along their
+    headings.
+    """
     total, count = np.zeros((len(which), table.shape[1])), np.zeros(len(which))
     for step in range(RIM_SAMPLE_COLUMNS):
         cell = np.round(lines.end[which] + step * lines.heading[which]).astype(np.int64)

@@ -1,7 +1,7 @@
-"""A part's cut end is closed: where it was held, or stood, its own surface goes on.
+"""End caps: the surface of a part continued over the face where it was cut.
 
-The part and what it was cut from change roles: what touches the part from outside stands on one of the part's
-faces, as `support_around` finds it, and that face is rebuilt under it.
+The part and its surroundings change roles: the solid vertices that touch the part from outside stand on a
+face of the part, which `find_support` finds, and the face is inpainted beneath them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from cagefield.edits.stack import EditStack
 from cagefield.typing import Mask
 
 TOUCH_DISTANCE_VERTICES = 4
-"""What comes this near to a part touches it; voxels."""
+"""Maximum distance of vertices that touch the part."""
 
 
 def close_cut_end(
@@ -30,31 +30,35 @@ def close_cut_end(
     part: Surfels,
     light: LightChange | None,
     below: EditStack,
-    sight: CameraVisibility | None,
+    visibility: CameraVisibility | None,
 ) -> GridBlock:
-    """The part's block, which is in its new light, with its face going on where it was held.
+    """Block of a part with its face inpainted where the part was held; unchanged without such a face.
 
-    As it is, where the part has no face that something stood on.
+    block: in its new light; inside [X,Y,Z]: mask of V^c; part: surfels of the part; light: change of light
+    on the part; visibility: visible surfaces of the field without edits.
     """
-    held = block.solid & ~inside
-    held &= ndimage.binary_dilation(block.solid & inside, iterations=TOUCH_DISTANCE_VERTICES)
-    if not held.any() or not len(part.points):
+    holder = block.solid & ~inside
+    holder &= ndimage.binary_dilation(block.solid & inside, iterations=TOUCH_DISTANCE_VERTICES)
+    if not holder.any() or not len(part.points):
         return block
-    at = block.coordinates(part.points)
-    away = ndimage.distance_transform_edt(~held)
-    away = np.asarray(ndimage.map_coordinates(away, at.T, order=1, mode="nearest"))
-    near = away < max(SUPPORT_DISTANCE_VOXELS, 0.5 * float(np.median(np.ptp(at, axis=0))))
-    support = find_support(held, part, at, near, max(block.spacing))
+    coordinates = block.block_coordinates(part.points)
+    distance = ndimage.distance_transform_edt(~holder)
+    distance = np.asarray(ndimage.map_coordinates(distance, coordinates.T, order=1, mode="nearest"))
+    is_near = distance < max(SUPPORT_DISTANCE_VOXELS, 0.5 * float(np.median(np.ptp(coordinates, axis=0))))
+    support = find_support(holder, part, coordinates, is_near, max(block.spacing))
     if support is None:
         return block
-    log = np.zeros(len(at)) if light is None else light.at(block, part.points)
-    dark = log > MAX_TRUSTED_LOG_GAIN
+    log = np.zeros(len(coordinates)) if light is None else light.interpolate(block, part.points)
+    is_shaded = log > MAX_TRUSTED_LOG_GAIN
     footprint = build_footprint(
-        support, held, at[near & (away < CONTACT_DISTANCE_VOXELS)], Surfels(at[dark], part.normals[dark])
+        support,
+        holder,
+        coordinates[is_near & (distance < CONTACT_DISTANCE_VOXELS)],
+        Surfels(coordinates[is_shaded], part.normals[is_shaded]),
     )
     if footprint is None:
         return block
     points = footprint.points(block)
-    if sight is not None:
-        footprint = footprint.without(is_reliable(points, below, sight, block, light), held)
+    if visibility is not None:
+        footprint = footprint.remove_known(is_reliable(points, below, visibility, block, light), holder)
     return inpaint_support(block, footprint, ~inside) if footprint.hole.any() else block

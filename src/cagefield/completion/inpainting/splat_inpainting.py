@@ -1,9 +1,8 @@
-"""New splats where a voxel grid of others was filled.
+"""Inpainting with splats: new splats on the surfaces of an inpainted voxel grid.
 
-What was filled has surfaces, ridges of density, on which new splats are laid a voxel apart: each is a copy of
-a splat beside the hole that lies on a surface and is of that colour, turned to the ridge's normal and made a
-voxel wide, with its colour multiplied so that it is that of the grid. What a cloned cage brings are copies of
-its own splats.
+Inpainted surfaces are ridges of density. New splats are laid on them a voxel apart: each is a copy of a
+splat beside the hole that lies flat on a surface and has the grid's color, rotated to the ridge's normal,
+scaled to a voxel, with its color multiplied to match. A cloned cage brings copies of its own splats.
 """
 
 from __future__ import annotations
@@ -31,19 +30,19 @@ from cagefield.typing import Array, Mask
 from cagefield.warps.hexahedron_map import HexahedronMap
 
 SPLAT_WIDTH_VOXELS = 0.7
-"""Standard deviation along the surface of a splat that fills, voxels."""
+"""Standard deviation of a new splat along the surface, voxels."""
 
 MAX_THICKNESS_VOXELS = 0.35
-"""Most of it across the surface, voxels."""
+"""Maximum standard deviation of a new splat across the surface, voxels."""
 
 MIN_FLAT_COSINE = 0.8
-"""Least cosine between the axis of a splat that lies flat and the surface's normal."""
+"""Minimum cosine between the shortest axis of a flat splat and the surface's normal."""
 
 MIN_UPPER_COSINE = 0.3
-"""Least cosine between the normals of what was filled and of the support."""
+"""Minimum cosine between the normals of an inpainted surface and of the support."""
 
 MIN_FLAT_SPLATS = 8
-"""Splats that lie flat, from which on others are not copied."""
+"""Minimum number of flat splats; with fewer, all splats beside the hole are copied."""
 
 HEIGHT_RADIUS_VOXELS = 12.0
 """Radius around the new splats in which known splats give the height of the surface, voxels."""
@@ -52,31 +51,30 @@ MAX_HEIGHT_CHANGE_VOXELS = 1.0
 """Maximum change of height of a new splat, voxels."""
 
 VIEW_DEPENDENCE_WEIGHT = 1.0
-"""How much a copied splat's dependence on the view counts, over what its colour is off (log)."""
+"""Weight of a splat's view dependence against its log color difference when a splat is chosen for a copy."""
 
 MIN_DIVISOR_COLOR = 0.02
-"""Colours that are darker than this count as this where they divide."""
+"""Minimum color as a divisor."""
 
 MIN_COPIED_OPACITY = 0.6
-"""Opacity of splats that are copied to fill, at least."""
+"""Minimum opacity of copied splats."""
 
 COLOR_GAIN_RANGE = (0.1, 10.0)
-"""What colours are multiplied by, at least and at most."""
+"""Minimum and maximum factor of colors."""
 
 
 NewSplats: TypeAlias = tuple[NDArray[np.int64], Array, Array, Array]
-"""New splats: rows [A] of those that they are copies of, where they are [A,3], what their shapes are
-multiplied by [A,3,3], and what their colours are [A,3]."""
+"""New splats: rows [A] of the splats they copy, means [A,3], factors of shapes [A,3,3], colors [A,3]."""
 
 NO_SPLATS: NewSplats = (np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)))
+"""No new splats."""
 
 
 @dataclass(frozen=True, eq=False)
 class KnownSplats:
-    """The splats [N] that the edits below make of a field, and the grid that they are on.
+    """Splats [N] of a field under the edits below, and their voxel grid.
 
-    rows [N]: those of the field that they are from; turns [N,3,3] and gains [N,3]: what their shapes and
-    colours were multiplied by.
+    rows [N]: their rows in the field; turns [N,3,3], gains [N,3]: factors of their shapes and colors.
     """
 
     splats: SplatField
@@ -86,7 +84,10 @@ class KnownSplats:
     gains: Array
 
     @classmethod
-    def of(cls, field: SplatField, splats: SplatField, grid: VoxelField, moved: MovedSplats) -> KnownSplats:
+    def from_moved(
+        cls, field: SplatField, splats: SplatField, grid: VoxelField, moved: MovedSplats
+    ) -> KnownSplats:
+        """Splats of a field that some edits moved, in `splats`, and stayed."""
         still = np.flatnonzero(~moved.left)
         gains = np.ones((len(moved.source), 3)) if moved.gains is None else moved.gains
         return cls(
@@ -97,110 +98,123 @@ class KnownSplats:
             np.concatenate([np.ones((len(still), 3)), gains]),
         )
 
-    def filled(self, under: GridBlock, fresh: Mask, region: Cage, inner: Cage, support: Support) -> NewSplats:
-        """Splats on the surface of what was filled, the support's upper side: `fresh` [X,Y,Z] of a block."""
-        at, normals = _upper_surface(under, fresh, support.normal)
-        kept = self._beside(under, region, inner, fresh, support.normal)
-        if not len(at) or not len(kept):
+    def fill_surface(
+        self, under: GridBlock, is_new: Mask, region: Cage, inner: Cage, support: Support
+    ) -> NewSplats:
+        """New splats on the upper side of an inpainted support, at the new vertices [X,Y,Z] of a block."""
+        coordinates, normals = _upper_surface(under, is_new, support.normal)
+        candidates = self._flat_neighbors(under, region, inner, is_new, support.normal)
+        if not len(coordinates) or not len(candidates):
             return NO_SPLATS
-        at = self._levelled(kept, under, support, at)
-        points = world_positions(under.field, at + under.low)
-        frames = rotation_matrices(self.splats.quaternions[kept].astype(np.float64))
-        scales = np.exp(self.splats.log_scales[kept].astype(np.float64))
-        colours = _interpolate_colors(under, at)
-        nearest = self._alike(kept, colours)
-        frames, scales = frames[nearest], scales[nearest]
-        each, thin = np.arange(len(at)), np.argmin(scales, axis=1)
-        across = frames[each, :, thin]
-        across = across * np.where(np.einsum("ni,ni->n", across, normals) < 0.0, -1.0, 1.0)[:, None]
+        coordinates = self._align_heights(candidates, under, support, coordinates)
+        points = world_positions(under.field, coordinates + under.low)
+        frames = rotation_matrices(self.splats.quaternions[candidates].astype(np.float64))
+        scales = np.exp(self.splats.log_scales[candidates].astype(np.float64))
+        colors = _interpolate_colors(under, coordinates)
+        match = self._match_colors(candidates, colors)
+        frames, scales = frames[match], scales[match]
+        numbers, shortest = np.arange(len(coordinates)), np.argmin(scales, axis=1)
+        normal = frames[numbers, :, shortest]
+        normal = normal * np.where(np.einsum("ni,ni->n", normal, normals) < 0.0, -1.0, 1.0)[:, None]
         voxel = float(under.field.voxel_size.max())
-        wanted = np.full(scales.shape, SPLAT_WIDTH_VOXELS * voxel)
-        wanted[each, thin] = np.minimum(scales[each, thin], MAX_THICKNESS_VOXELS * voxel)
-        shapes = (frames * (wanted / scales)[:, None]) @ np.swapaxes(frames, 1, 2)
-        return kept[nearest], points, _smallest_rotations(np.asarray(across), normals) @ shapes, colours
+        target_scales = np.full(scales.shape, SPLAT_WIDTH_VOXELS * voxel)
+        target_scales[numbers, shortest] = np.minimum(scales[numbers, shortest], MAX_THICKNESS_VOXELS * voxel)
+        shapes = (frames * (target_scales / scales)[:, None]) @ np.swapaxes(frames, 1, 2)
+        return candidates[match], points, _smallest_rotations(np.asarray(normal), normals) @ shapes, colors
 
-    def _levelled(self, kept: NDArray[np.int64], under: GridBlock, support: Support, at: Array) -> Array:
-        """Block coordinates [A,3] taken, by OFF at most, to where some splats' surface goes on."""
-        g = self.grid.grid_coordinates(self.splats.means[kept].astype(np.float64)) - under.low
-        (uv, height), (to, now) = support.local(g), support.local(at)
+    def _align_heights(
+        self, candidates: NDArray[np.int64], under: GridBlock, support: Support, coordinates: Array
+    ) -> Array:
+        """Block coordinates [A,3] moved along the support's normal to the height of known splats."""
+        g = self.grid.grid_coordinates(self.splats.means[candidates].astype(np.float64)) - under.low
+        (uv, height), (target_uv, target_height) = support.to_local(g), support.to_local(coordinates)
         members = np.flatnonzero(
-            cKDTree(at).query(g, distance_upper_bound=HEIGHT_RADIUS_VOXELS)[0] < HEIGHT_RADIUS_VOXELS
+            cKDTree(coordinates).query(g, distance_upper_bound=HEIGHT_RADIUS_VOXELS)[0] < HEIGHT_RADIUS_VOXELS
         )
-        members = members[np.abs(height[members] - np.median(now)) < HEIGHT_RADIUS_VOXELS]
+        members = members[np.abs(height[members] - np.median(target_height)) < HEIGHT_RADIUS_VOXELS]
         if len(members) < MIN_FLAT_SPLATS:
-            return at
+            return coordinates
         _, first = np.unique(np.round(uv[members], 3), axis=0, return_index=True)
         members = members[first][:MAX_SPLINE_KNOTS]
         spline = RBFInterpolator(uv[members], height[members], neighbors=32, smoothing=1.0)
-        off = np.clip(spline(to) - now, -MAX_HEIGHT_CHANGE_VOXELS, MAX_HEIGHT_CHANGE_VOXELS)
-        return np.asarray(at + off[:, None] * support.normal)
+        change = np.clip(
+            spline(target_uv) - target_height, -MAX_HEIGHT_CHANGE_VOXELS, MAX_HEIGHT_CHANGE_VOXELS
+        )
+        return np.asarray(coordinates + change[:, None] * support.normal)
 
-    def _alike(self, kept: NDArray[np.int64], colours: Array) -> NDArray[np.int64]:
-        """Which [A] of some splats to copy: those of colours nearest to [A,3], and the same all around.
-
-        Where they are and how they lie makes no difference to copies.
+    def _match_colors(self, rows: NDArray[np.int64], colors: Array) -> NDArray[np.int64]:
+        """Rows [A], among `rows`, of the splats to copy: nearest in color to [A,3], with little view
+        dependence.
         """
-        own, wanted = (np.log(np.maximum(rgb, MIN_DIVISOR_COLOR)) for rgb in (self.colours(kept), colours))
-        turning = np.sqrt((self.splats.sh[kept, 1:].astype(np.float64) ** 2).sum(axis=(1, 2)) / (4.0 * np.pi))
-        turning /= np.maximum(self.colours(kept).mean(axis=1), MIN_DIVISOR_COLOR)
-        near = cKDTree(np.c_[own, VIEW_DEPENDENCE_WEIGHT * turning]).query(
-            np.c_[wanted, np.zeros(len(wanted))]
+        splat_log, target_log = (
+            np.log(np.maximum(rgb, MIN_DIVISOR_COLOR)) for rgb in (self.mean_colors(rows), colors)
+        )
+        view_dependence = np.sqrt(
+            (self.splats.sh[rows, 1:].astype(np.float64) ** 2).sum(axis=(1, 2)) / (4.0 * np.pi)
+        )
+        view_dependence /= np.maximum(self.mean_colors(rows).mean(axis=1), MIN_DIVISOR_COLOR)
+        match = cKDTree(np.c_[splat_log, VIEW_DEPENDENCE_WEIGHT * view_dependence]).query(
+            np.c_[target_log, np.zeros(len(target_log))]
         )[1]
-        return np.asarray(near)
+        return np.asarray(match)
 
-    def _beside(
-        self, under: GridBlock, region: Cage, inner: Cage, fresh: Mask, normal: Array
+    def _flat_neighbors(
+        self, under: GridBlock, region: Cage, inner: Cage, is_new: Mask, normal: Array
     ) -> NDArray[np.int64]:
-        """Splats beside the hole that lie flat on what it was filled with."""
+        """Rows [M] of opaque splats beside the hole that lie flat on the inpainted surface."""
         splats = self.splats
         means = splats.means.astype(np.float64)
-        found = region.contains(means) & ~inner.contains(means) & (splats.opacities > MIN_COPIED_OPACITY)
-        kept = np.flatnonzero(found)
-        g = np.round(self.grid.grid_coordinates(means[kept]) - under.low).astype(np.int64)
-        g = np.clip(g, 0, np.array(fresh.shape) - 1)
-        kept = kept[~fresh[tuple(g.T)]]
-        axes = rotation_matrices(splats.quaternions[kept].astype(np.float64))
-        thin = np.argmin(splats.log_scales[kept], axis=1)
-        flat = np.abs(axes[np.arange(len(kept)), :, thin] @ normal) > MIN_FLAT_COSINE
-        return kept[flat] if flat.sum() >= MIN_FLAT_SPLATS else kept
+        is_candidate = (
+            region.contains(means) & ~inner.contains(means) & (splats.opacities > MIN_COPIED_OPACITY)
+        )
+        rows = np.flatnonzero(is_candidate)
+        g = np.round(self.grid.grid_coordinates(means[rows]) - under.low).astype(np.int64)
+        g = np.clip(g, 0, np.array(is_new.shape) - 1)
+        rows = rows[~is_new[tuple(g.T)]]
+        axes = rotation_matrices(splats.quaternions[rows].astype(np.float64))
+        shortest = np.argmin(splats.log_scales[rows], axis=1)
+        is_flat = np.abs(axes[np.arange(len(rows)), :, shortest] @ normal) > MIN_FLAT_COSINE
+        return rows[is_flat] if is_flat.sum() >= MIN_FLAT_SPLATS else rows
 
-    def cloned(self, under: GridBlock, inner: Cage, source: Cage) -> NewSplats:
-        """Copies of the splats of the source cage, in colours that go with V^c's surroundings."""
+    def clone_cage(self, under: GridBlock, inner: Cage, source: Cage) -> NewSplats:
+        """Copies of the splats in the source cage, with colors blended to the surroundings of V^c."""
         means = self.splats.means.astype(np.float64)
         rows = np.flatnonzero(source.contains(means))
-        within, there, shapes = HexahedronMap(inner, source)(means[rows])
-        rows = rows[within]
-        now = _interpolate_colors(under, under.field.grid_coordinates(there) - under.low)
-        before = 0.5 + C0 * interpolate_field(self.grid, means[rows])[1][:, 0].astype(np.float64)
-        own = self.colours(rows)
-        known = np.asarray((now > 0.0).all(axis=1) & (before > MIN_DIVISOR_COLOR).all(axis=1))
+        is_mapped, means_in_v, shapes = HexahedronMap(inner, source)(means[rows])
+        rows = rows[is_mapped]
+        grid_color = _interpolate_colors(under, under.field.grid_coordinates(means_in_v) - under.low)
+        source_color = 0.5 + C0 * interpolate_field(self.grid, means[rows])[1][:, 0].astype(np.float64)
+        colors = self.mean_colors(rows)
+        is_known = np.asarray((grid_color > 0.0).all(axis=1) & (source_color > MIN_DIVISOR_COLOR).all(axis=1))
         return (
             rows,
-            there,
+            means_in_v,
             shapes,
-            np.where(known[:, None], own * now / np.maximum(before, MIN_DIVISOR_COLOR), own),
+            np.where(
+                is_known[:, None], colors * grid_color / np.maximum(source_color, MIN_DIVISOR_COLOR), colors
+            ),
         )
 
-    def colours(self, rows: NDArray[np.int64]) -> Array:
-        """Colours [N,3] of splats, the mean over directions."""
+    def mean_colors(self, rows: NDArray[np.int64]) -> Array:
+        """Colors [N,3] of splats, means over directions."""
         return np.maximum(0.5 + C0 * self.splats.sh[rows, 0].astype(np.float64), 0.0)
 
-    def patch(
+    def build_patch(
         self,
         field: SplatField,
         region: Cage,
-        gone: Mask,
+        is_replaced: Mask,
         light: NewLight,
         part: NewLight | None,
         new: NewSplats,
     ) -> SplatPatch:
-        """The patch with new splats of the field's edit; its other arguments are the patch's."""
-        rows, points, shapes, colours = new
-        gains = self.gains[rows] * colours / np.maximum(self.colours(rows), MIN_DIVISOR_COLOR)
+        """Patch with new splats; other arguments as in `SplatPatch`."""
+        rows, points, shapes, colors = new
+        gains = self.gains[rows] * colors / np.maximum(self.mean_colors(rows), MIN_DIVISOR_COLOR)
         return SplatPatch(
             field,
             region,
-            gone,
+            is_replaced,
             light,
             part,
             self.rows[rows],
@@ -210,41 +224,41 @@ class KnownSplats:
         )
 
 
-def _upper_surface(block: GridBlock, fresh: Mask, up: Array) -> tuple[Array, Array]:
-    """(block coordinates [A,3], unit normals [A,3]) of the upper side of what is fresh [X,Y,Z]."""
+def _upper_surface(block: GridBlock, is_new: Mask, up: Array) -> tuple[Array, Array]:
+    """(block coordinates [A,3], unit normals [A,3]) of the upper side of the new vertices [X,Y,Z]."""
     solid = block.solid
-    found = fresh & solid & ndimage.binary_dilation(~solid) & (block.normals @ up > MIN_UPPER_COSINE)
-    vertices, normals = np.argwhere(found).astype(np.float64), block.normals[found].astype(np.float64)
+    mask = is_new & solid & ndimage.binary_dilation(~solid) & (block.normals @ up > MIN_UPPER_COSINE)
+    vertices, normals = np.argwhere(mask).astype(np.float64), block.normals[mask].astype(np.float64)
     steps = np.arange(-2.0, 2.25, 0.25)
-    along = [
+    samples = [
         ndimage.map_coordinates(block.depth, (vertices + step * normals).T, order=1, mode="nearest")
         for step in steps
     ]
-    depth = np.stack(along)
-    # Splats lie where the surface is densest, which goes on below as if it were solid.
-    dense = depth >= 0.9 * np.minimum(depth.max(axis=0), depth[: len(steps) // 2 + 1].max(axis=0))
-    last = len(steps) - 1 - np.argmax(dense[::-1], axis=0)
-    at = vertices + steps[last][:, None] * normals
-    # Vertices above each other lead to the same point.
-    _, first = np.unique(np.round(at / 0.8).astype(np.int64), axis=0, return_index=True)
-    return at[first], normals[first]
+    depth = np.stack(samples)
+    # Place splats at the upper end of the dense layer, which continues below the surface.
+    is_dense = depth >= 0.9 * np.minimum(depth.max(axis=0), depth[: len(steps) // 2 + 1].max(axis=0))
+    last = len(steps) - 1 - np.argmax(is_dense[::-1], axis=0)
+    coordinates = vertices + steps[last][:, None] * normals
+    # Vertices above each other give the same point: keep one.
+    _, first = np.unique(np.round(coordinates / 0.8).astype(np.int64), axis=0, return_index=True)
+    return coordinates[first], normals[first]
 
 
-def _interpolate_colors(block: GridBlock, at: Array) -> Array:
-    """Colours [N,3] of a block at block coordinates [N,3], of what is dense there; 0 where nothing is."""
+def _interpolate_colors(block: GridBlock, coordinates: Array) -> Array:
+    """Colors [N,3] of a block at block coordinates [N,3], weighted by density; 0 in empty space."""
     weight = np.where(block.slot >= 0, block.depth + 1e-3, 0.0)
-    total = ndimage.map_coordinates(weight, at.T, np.float64, order=1)
-    rgb = np.zeros((len(at), 3))
+    total = ndimage.map_coordinates(weight, coordinates.T, np.float64, order=1)
+    rgb = np.zeros((len(coordinates), 3))
     for channel in range(3):
         values = np.zeros(block.shape)
         where = block.slot >= 0
         values[where] = 0.5 + C0 * block.sh[block.slot[where], 0, channel]
-        rgb[:, channel] = ndimage.map_coordinates(values * weight, at.T, np.float64, order=1)
+        rgb[:, channel] = ndimage.map_coordinates(values * weight, coordinates.T, np.float64, order=1)
     return np.maximum(rgb / np.maximum(total, 1e-6)[:, None], 0.0)
 
 
 def _smallest_rotations(start: Array, end: Array) -> Array:
-    """The smallest rotations [N,3,3] that take unit vectors [N,3] to others, at most a right angle away."""
+    """Smallest rotations [N,3,3] of unit vectors [N,3] to others, at most a right angle away."""
     axis = np.cross(start, end)
     cosine = np.einsum("ni,ni->n", start, end)
     skew = np.zeros((len(start), 3, 3))

@@ -1,9 +1,9 @@
-"""A support goes on where nothing was seen of it: the densities and colours of a footprint's columns.
+"""Inpainting of a support: densities and colors of the columns of a footprint.
 
-The densities are those of the surfaces around, at the same height over the support, and the colours are the
-membrane that spans the hole: each coefficient solves Laplace's equation between those at the hole's rim.
-Where a texture has a grain its lines go on (`completion.inpainting.coherence_transport`), and so does its
-pattern (`completion.inpainting.exemplar_inpainting`).
+Densities are medians of the surfaces around, at the same height over the support. Colors are the membrane
+over the hole: each coefficient solves Laplace's equation with the values at the rim as boundary. The lines
+(`completion.inpainting.coherence_transport`) and patches (`completion.inpainting.exemplar_inpainting`) of a
+texture are continued.
 
 Source: Perez, Gangnet and Blake, "Poisson image editing" (2003), for the membrane (without guidance).
 """
@@ -23,13 +23,13 @@ from cagefield.fields.sh import sh_basis
 from cagefield.typing import AnyArray, Array, Float32, Mask
 
 MIN_SUPPORT_HEIGHT_VOXELS = -4.0
-"""Height over a support, voxels, from which on it is made anew, up to HIGH."""
+"""Minimum height over a support at which densities are rebuilt, voxels; up to MAX_SUPPORT_HEIGHT_VOXELS."""
 
 MAX_COLOR_HEIGHT_VOXELS = 1.6
-"""Height over a support, voxels, up to which its colours are."""
+"""Maximum height over a support of its colors, voxels."""
 
 EDGE_WIDTH_COLUMNS = 3
-"""Columns at the edge of a support whose colours do not go on, and that may face aside."""
+"""Width of the edge of a support, columns: its colors are not continued, and its normals may tilt."""
 
 MAX_SIDE_COSINE = 0.6
 """Maximum cosine between the normals of a support's side and of the support."""
@@ -53,114 +53,122 @@ MAX_FOG_OPTICAL_DEPTH = 0.5
 """Maximum optical depth of fog per voxel."""
 
 VIEW_COUNT = 32
-"""Directions from which colours are looked at."""
+"""Number of view directions in which colors are sampled."""
 
 VIEW_INDEPENDENCE_WEIGHT = 0.01
-"""How firmly colours are held to be the same from all of them."""
+"""Weight of the penalty on view-dependent coefficients."""
 
 
 def inpaint_support(
-    block: GridBlock, footprint: Footprint, removed: Mask, *, stays: bool = False
+    block: GridBlock, footprint: Footprint, removed: Mask, *, keep_removed: bool = False
 ) -> GridBlock:
-    """The block with the support going on in its hole; `removed` [X,Y,Z] are the vertices of V^c.
+    """Block with the support continued in the footprint's hole.
 
-    Where that `stays`, under a continuous edit, nothing in V^c changes.
+    removed [X,Y,Z]: mask of V^c. With `keep_removed`, beneath a continuous edit, no vertex of V^c changes.
     """
-    voxels = np.argwhere(np.ones(block.shape, bool))
-    u, v, height = footprint.column(voxels.astype(np.float64))
-    known = u >= 0
-    voxels, u, v, height = voxels[known], u[known], v[known], height[known]
+    vertices = np.argwhere(np.ones(block.shape, bool))
+    u, v, height = footprint.locate(vertices.astype(np.float64))
+    in_grid = u >= 0
+    vertices, u, v, height = vertices[in_grid], u[in_grid], v[in_grid], height[in_grid]
     hole = footprint.hole[u, v]
-    around = footprint.around[u, v] & ~removed[tuple(voxels.T)]
-    level = (height >= MIN_SUPPORT_HEIGHT_VOXELS) & (height <= MAX_SUPPORT_HEIGHT_VOXELS)
-    # What stands or hangs above V^c is not of the part, and stays.
-    gone = removed[tuple(voxels.T)]
+    around = footprint.surroundings[u, v] & ~removed[tuple(vertices.T)]
+    in_height = (height >= MIN_SUPPORT_HEIGHT_VOXELS) & (height <= MAX_SUPPORT_HEIGHT_VOXELS)
+    # Keep content above V^c: it is not of the part.
+    is_removed = removed[tuple(vertices.T)]
     top = np.full(footprint.hole.shape, -np.inf)
-    np.maximum.at(top, (u[gone], v[gone]), height[gone])
+    np.maximum.at(top, (u[is_removed], v[is_removed]), height[is_removed])
     nearest = ndimage.distance_transform_edt(np.isinf(top), return_distances=False, return_indices=True)
     hole &= height <= top[tuple(nearest)][u, v] + 0.5
     known_columns = (u[around], v[around], height[around])
-    hole &= ~_side_vertices(block, footprint, removed)[tuple(voxels.T)]
-    if stays:
-        hole &= ~gone
-    profile = _density_profile(block, voxels[around & level], height[around & level])
-    # Crusts of what was taken away, between the support and V^c.
-    nearby = ndimage.binary_dilation(removed, iterations=4)
-    crust = hole & (height > MAX_SUPPORT_HEIGHT_VOXELS) & nearby[tuple(voxels.T)]
-    new = hole & level
-    where = np.zeros(block.shape, bool)
-    where[tuple(voxels[crust].T)] = True
-    block = block.with_density(where, np.zeros(int(where.sum()), np.float32))
-    where[:] = False
-    where[tuple(voxels[new].T)] = True
+    hole &= ~_side_vertices(block, footprint, removed)[tuple(vertices.T)]
+    if keep_removed:
+        hole &= ~is_removed
+    profile = _density_profile(block, vertices[around & in_height], height[around & in_height])
+    # Empty the crust of the part's surface between the support and V^c.
+    near_removed = ndimage.binary_dilation(removed, iterations=4)
+    crust = hole & (height > MAX_SUPPORT_HEIGHT_VOXELS) & near_removed[tuple(vertices.T)]
+    is_new = hole & in_height
+    mask = np.zeros(block.shape, bool)
+    mask[tuple(vertices[crust].T)] = True
+    block = block.with_density(mask, np.zeros(int(mask.sum()), np.float32))
+    mask[:] = False
+    mask[tuple(vertices[is_new].T)] = True
     values = np.zeros(block.shape, np.float32)
     heights = np.arange(MIN_SUPPORT_HEIGHT_VOXELS, MAX_SUPPORT_HEIGHT_VOXELS + 0.25, 0.5)
-    values[tuple(voxels[new].T)] = np.interp(height[new], heights, profile)
-    below = where & (block.density > values)
-    deep = np.zeros(block.shape, bool)
-    deep[tuple(voxels[new & (height < -1.5)].T)] = True
-    values = np.where(below & deep, block.density, values)
-    block = block.with_density(where, values[where], slots=True)
-    if stays:
-        over = (
+    values[tuple(vertices[is_new].T)] = np.interp(height[is_new], heights, profile)
+    below = mask & (block.density > values)
+    is_deep = np.zeros(block.shape, bool)
+    is_deep[tuple(vertices[is_new & (height < -1.5)].T)] = True
+    values = np.where(below & is_deep, block.density, values)
+    block = block.with_density(mask, values[mask], slots=True)
+    if keep_removed:
+        above_support = (
             (around | hole) & (height > MIN_FOG_HEIGHT_VOXELS) & (height <= MAX_SUPPORT_HEIGHT_VOXELS + 2.0)
         )
-        over &= _columns_beneath(footprint, np.argwhere(removed))[u, v]
-        block = _remove_fog(block, voxels[over], np.interp(height[over], heights, profile))
-    return _inpaint_colors(block, footprint, voxels[new], (u[new], v[new]), voxels[around], known_columns)
+        above_support &= _columns_beneath(footprint, np.argwhere(removed))[u, v]
+        block = _remove_fog(
+            block, vertices[above_support], np.interp(height[above_support], heights, profile)
+        )
+    return _inpaint_colors(
+        block, footprint, vertices[is_new], (u[is_new], v[is_new]), vertices[around], known_columns
+    )
 
 
-def _columns_beneath(footprint: Footprint, at: NDArray[np.int64]) -> Mask:
-    """Columns [U,V] under block coordinates [N,3] of a part, and RING around them."""
-    u, v, _ = footprint.column(at.astype(np.float64))
+def _columns_beneath(footprint: Footprint, vertices: NDArray[np.int64]) -> Mask:
+    """Mask [U,V] of the columns under block coordinates [N,3] of a part, with a margin of
+    BLEND_WIDTH_COLUMNS.
+    """
+    u, v, _ = footprint.locate(vertices.astype(np.float64))
     columns = np.zeros(footprint.hole.shape, bool)
     columns[u[u >= 0], v[u >= 0]] = True
     return np.asarray(ndimage.distance_transform_edt(~columns) <= BLEND_WIDTH_COLUMNS)
 
 
-def _remove_fog(block: GridBlock, at: NDArray[np.int64], most: Array) -> GridBlock:
-    """The block with no fog at vertices [N,3], of which a support shows `most` [N] by its density.
+def _remove_fog(block: GridBlock, vertices: NDArray[np.int64], max_density: Array) -> GridBlock:
+    """Block without fog at vertices [N,3], up to the density profile [N] of the support.
 
-    A continuous edit that lifts a part draws what is between it and the support out to a veil.
+    A continuous edit that lifts a part stretches the content between part and support into a veil.
     """
-    rows = tuple(at.T)
-    fog = (block.depth[rows] < MAX_FOG_OPTICAL_DEPTH) & (block.density[rows] > np.maximum(most, 0.0))
-    where = np.zeros(block.shape, bool)
-    where[tuple(at[fog].T)] = True
+    rows = tuple(vertices.T)
+    is_fog = (block.depth[rows] < MAX_FOG_OPTICAL_DEPTH) & (
+        block.density[rows] > np.maximum(max_density, 0.0)
+    )
+    mask = np.zeros(block.shape, bool)
+    mask[tuple(vertices[is_fog].T)] = True
     values = np.zeros(block.shape, np.float32)
-    values[tuple(at[fog].T)] = np.maximum(most[fog], 0.0)
-    return block.with_density(where, values[where])
+    values[tuple(vertices[is_fog].T)] = np.maximum(max_density[is_fog], 0.0)
+    return block.with_density(mask, values[mask])
 
 
 def _side_vertices(block: GridBlock, footprint: Footprint, removed: Mask) -> Mask:
-    """[X,Y,Z], where the support's edge was seen to face aside, not close to what was removed [X,Y,Z]."""
-    columns = ndimage.binary_fill_holes(footprint.around | footprint.hole)
-    edge = footprint.surfaced & columns & ~ndimage.binary_erosion(columns, iterations=EDGE_WIDTH_COLUMNS)
-    at = np.argwhere(ndimage.distance_transform_edt(~removed) > SIDE_DISTANCE_VOXELS)
-    u, v, height = footprint.column(at.astype(np.float64))
-    normals = block.normals[tuple(at.T)]
-    facing = normals @ footprint.support.normal
-    side = (
+    """Mask [X,Y,Z] of the sides of the support's edge, away from the removed vertices [X,Y,Z]."""
+    columns = ndimage.binary_fill_holes(footprint.surroundings | footprint.hole)
+    edge = footprint.has_surface & columns & ~ndimage.binary_erosion(columns, iterations=EDGE_WIDTH_COLUMNS)
+    vertices = np.argwhere(ndimage.distance_transform_edt(~removed) > SIDE_DISTANCE_VOXELS)
+    u, v, height = footprint.locate(vertices.astype(np.float64))
+    normals = block.normals[tuple(vertices.T)]
+    cosine = normals @ footprint.support.normal
+    is_side = (
         (u >= 0)
         & edge[u, v]
         & (height < MAX_COLOR_HEIGHT_VOXELS)
-        & (facing < MAX_SIDE_COSINE)
+        & (cosine < MAX_SIDE_COSINE)
         & ((normals**2).sum(axis=1) > 0.25)
     )
-    found = np.zeros(block.shape, bool)
-    found[tuple(at[side].T)] = True
-    return found
+    mask = np.zeros(block.shape, bool)
+    mask[tuple(vertices[is_side].T)] = True
+    return mask
 
 
-def _density_profile(block: GridBlock, at: NDArray[np.int64], height: Array) -> Array:
-    """Median densities at heights DEEP, DEEP + 1/2, ... HIGH over the support."""
+def _density_profile(block: GridBlock, vertices: NDArray[np.int64], height: Array) -> Array:
+    """Median densities [H] at heights MIN_SUPPORT_HEIGHT_VOXELS, +0.5, ... over the support."""
     heights = np.arange(MIN_SUPPORT_HEIGHT_VOXELS, MAX_SUPPORT_HEIGHT_VOXELS + 0.25, 0.5)
-    values = block.density[tuple(at.T)]
+    values = block.density[tuple(vertices.T)]
     profile = np.zeros(len(heights))
     for number, level in enumerate(heights):
-        here = np.abs(height - level) <= 0.3
-        profile[number] = np.median(values[here]) if here.any() else profile[number - 1]
-    # Photos do not say how dense it is inside; above, nothing rises again.
+        at_level = np.abs(height - level) <= 0.3
+        profile[number] = np.median(values[at_level]) if at_level.any() else profile[number - 1]
+    # Photos do not constrain the density inside: make the profile monotone on both sides of its maximum.
     top = int(np.argmax(profile))
     profile[:top] = np.maximum(profile[:top], profile[top])
     profile[top:] = np.minimum.accumulate(profile[top:])
@@ -175,7 +183,11 @@ def _inpaint_colors(
     known: NDArray[np.int64],
     above: tuple[NDArray[np.int64], NDArray[np.int64], Array],
 ) -> GridBlock:
-    """The block with the membrane's coefficients in the hole."""
+    """Block with inpainted coefficients in the hole.
+
+    new, known: vertices [N,3] in the hole and in the surroundings; column: (u, v) of the new ones; above:
+    (u, v, height) of the known ones.
+    """
     u, v, height = above
     shape = footprint.hole.shape
     slot = block.slot[tuple(known.T)]
@@ -183,69 +195,76 @@ def _inpaint_colors(
     cell = np.ravel_multi_index((u[rows], v[rows]), shape)
     weight = _visible_weights(cell, height[rows], block.depth[tuple(known[rows].T)])
     total = np.bincount(cell, weight, minlength=int(np.prod(shape)))
-    given = total > 0.0
+    is_given = total > 0.0
     width = int(np.prod(block.sh.shape[1:]))
     table = np.zeros((len(total), width))
     values = _clamp_visible_colors(block.sh[slot[rows]], footprint.support.normal / np.array(block.spacing))
     values = values.reshape(-1, width)
     for channel in range(width):
         table[:, channel] = np.bincount(cell, weight * values[:, channel], minlength=len(total))
-    table[given] /= total[given][:, None]
-    given &= footprint.around.reshape(-1)
-    # The edge of the support is of another colour, often.
-    inner = ndimage.binary_erosion(footprint.around | footprint.hole, iterations=EDGE_WIDTH_COLUMNS).reshape(
-        -1
-    )
-    given = given & inner if (given & inner).any() else given
-    share = _blend_weight(footprint).reshape(-1)
-    sure = given & (share < MAX_BOUNDARY_BLEND)
-    given = sure if sure.any() else given
-    unknown = (footprint.hole.reshape(-1) | (share > 0.0)).reshape(shape)
-    firm = np.where(total > 0.0, 1.0 - share, 0.0) * ~footprint.hole.reshape(-1)
-    own, table = table, _inpaint_table(unknown, given.reshape(shape), table, firm.reshape(shape))
+    table[is_given] /= total[is_given][:, None]
+    is_given &= footprint.surroundings.reshape(-1)
+    # The edge of a support often has another color.
+    inner = ndimage.binary_erosion(
+        footprint.surroundings | footprint.hole, iterations=EDGE_WIDTH_COLUMNS
+    ).reshape(-1)
+    is_given = is_given & inner if (is_given & inner).any() else is_given
+    blend = _blend_weight(footprint).reshape(-1)
+    is_certain = is_given & (blend < MAX_BOUNDARY_BLEND)
+    is_given = is_certain if is_certain.any() else is_given
+    unknown = (footprint.hole.reshape(-1) | (blend > 0.0)).reshape(shape)
+    confidence = np.where(total > 0.0, 1.0 - blend, 0.0) * ~footprint.hole.reshape(-1)
+    stored, table = table, _inpaint_table(unknown, is_given.reshape(shape), table, confidence.reshape(shape))
     sh = block.sh.copy()
-    beside = np.ravel_multi_index((u, v), shape)
-    rows = (slot >= 0) & (share[beside] > 0.0) & (height < MAX_COLOR_HEIGHT_VOXELS) & (total[beside] > 0.0)
-    change = share[:, None] * (table - own)
-    sh[slot[rows]] += change[beside[rows]].reshape(-1, *block.sh.shape[1:])
-    place = block.slot[tuple(new.T)]
-    kept = place >= 0
-    cells = np.ravel_multi_index((column[0][kept], column[1][kept]), shape)
-    sh[place[kept]] = table[cells].reshape(-1, *block.sh.shape[1:])
+    known_cell = np.ravel_multi_index((u, v), shape)
+    rows = (
+        (slot >= 0)
+        & (blend[known_cell] > 0.0)
+        & (height < MAX_COLOR_HEIGHT_VOXELS)
+        & (total[known_cell] > 0.0)
+    )
+    change = blend[:, None] * (table - stored)
+    sh[slot[rows]] += change[known_cell[rows]].reshape(-1, *block.sh.shape[1:])
+    new_slot = block.slot[tuple(new.T)]
+    has_slot = new_slot >= 0
+    cells = np.ravel_multi_index((column[0][has_slot], column[1][has_slot]), shape)
+    sh[new_slot[has_slot]] = table[cells].reshape(-1, *block.sh.shape[1:])
     return GridBlock(block.field, block.low, block.density, block.slot, sh)
 
 
 def _blend_weight(footprint: Footprint) -> Array:
-    """The share [U,V] that the membrane has in colours right beside the hole.
+    """Weight [U,V] of the membrane in stored colors right beside the hole.
 
-    What is close to where something stood is dark, so that the new light on it is the least sure.
+    Surfaces close to the part were dark; the change of light is the least certain there.
     """
-    if footprint.changed is None:
+    if footprint.log_light_change is None:
         return np.zeros(footprint.hole.shape)
-    away = ndimage.distance_transform_edt(~footprint.hole)
-    near = np.clip(1.0 - away / BLEND_WIDTH_COLUMNS, 0.0, 1.0) * footprint.around
-    return np.asarray(near * np.clip(np.abs(footprint.changed) / FULL_BLEND_LOG_CHANGE, 0.0, 1.0))
+    distance = ndimage.distance_transform_edt(~footprint.hole)
+    nearness = np.clip(1.0 - distance / BLEND_WIDTH_COLUMNS, 0.0, 1.0) * footprint.surroundings
+    return np.asarray(
+        nearness * np.clip(np.abs(footprint.log_light_change) / FULL_BLEND_LOG_CHANGE, 0.0, 1.0)
+    )
 
 
 def _visible_weights(column: NDArray[np.int64], height: Array, depth: AnyArray) -> Array:
-    """The share [N] that vertices have in what is seen of their columns [N] from above.
+    """Weights [N] of vertices in the visible colors of their columns [N], seen from above.
 
-    height, depth [N]: theirs over the support, and their optical depth.
+    height, depth [N]: heights over the support, and optical depths.
     """
     order = np.lexsort((-height, column))
-    passed = np.cumsum(depth[order].astype(np.float64)) - depth[order]
+    depth_above = np.cumsum(depth[order].astype(np.float64)) - depth[order]
     first = np.r_[True, np.diff(column[order]) > 0]
-    passed -= np.maximum.accumulate(np.where(first, passed, 0.0))
-    share = np.zeros(len(column))
-    share[order] = np.exp(-passed) * (1.0 - np.exp(-depth[order])) + 1e-6
-    return share
+    depth_above -= np.maximum.accumulate(np.where(first, depth_above, 0.0))
+    weight = np.zeros(len(column))
+    weight[order] = np.exp(-depth_above) * (1.0 - np.exp(-depth[order])) + 1e-6
+    return weight
 
 
 def _clamp_visible_colors(sh: Float32, normal: Array) -> Array:
-    """Coefficients [N,K,3] that are as sh [N,K,3] seen from the normal's side [3], and never below black.
+    """Coefficients [N,K,3] with the colors of sh [N,K,3] on the normal's side [3], clamped to black.
 
-    Those of single vertices may be far below, where nothing shows of it; their means would be darker than
-    what is seen.
+    Single vertices may be far below black where they do not show; their means would be darker than the
+    surface.
     """
     count = np.arange(VIEW_COUNT)
     up = (count + 0.5) / VIEW_COUNT
@@ -255,54 +274,54 @@ def _clamp_visible_colors(sh: Float32, normal: Array) -> Array:
     n = normal / np.linalg.norm(normal)
     views = -(np.outer(up, n) + np.outer(across * np.cos(angle), u) + np.outer(across * np.sin(angle), v))
     basis = sh_basis(views, int(np.sqrt(sh.shape[1])) - 1)
-    seen = np.maximum(0.5 + np.einsum("dk,nkc->ndc", basis, sh), 0.0) - 0.5
-    firm = np.eye(sh.shape[1]) * VIEW_INDEPENDENCE_WEIGHT * VIEW_COUNT
-    firm[0, 0] = 0.0
-    return np.einsum("kd,ndc->nkc", np.linalg.solve(basis.T @ basis + firm, basis.T), seen)
+    visible = np.maximum(0.5 + np.einsum("dk,nkc->ndc", basis, sh), 0.0) - 0.5
+    penalty = np.eye(sh.shape[1]) * VIEW_INDEPENDENCE_WEIGHT * VIEW_COUNT
+    penalty[0, 0] = 0.0
+    return np.einsum("kd,ndc->nkc", np.linalg.solve(basis.T @ basis + penalty, basis.T), visible)
 
 
-def _inpaint_table(unknown: Mask, given: Mask, table: Array, firm: Array) -> Array:
-    """The rows [U*V,C] with those of the unknown [U,V]: the membrane's, and the grain's where it goes on.
+def _inpaint_table(unknown: Mask, given: Mask, table: Array, confidence: Array) -> Array:
+    """Rows [U*V,C] with the unknown columns [U,V] inpainted: membrane, transported lines, and texture.
 
-    What is seen from all sides of them, the first three values, has the pattern around, and fits to the rows
-    themselves as far as these are `firm` [U,V].
+    The first three values, the mean colors, get the texture, which fits stored rows by their `confidence`
+    [U,V].
     """
-    spanned = solve_membrane(unknown, given, table)
-    sought = unknown & ~given
+    filled = solve_membrane(unknown, given, table)
+    unfilled = unknown & ~given
     values = table[:, :3].sum(axis=1).reshape(given.shape)
-    grain = estimate_orientation(
-        values, given, lambda known, rows: solve_membrane(sought | given, known, rows)
+    orientation = estimate_orientation(
+        values, given, lambda known, rows: solve_membrane(unfilled | given, known, rows)
     )
-    rows, share = transport_colors(sought, given, table, grain)
-    at = np.flatnonzero(sought)
-    spanned[at] += share[:, None] * (rows - spanned[at])
-    own, start = (each[:, :3].reshape(*given.shape, 3) for each in (table, spanned))
-    spanned[at, :3] = inpaint_texture(sought, given, own, start, firm)[sought]
-    return spanned
+    rows, weight = transport_colors(unfilled, given, table, orientation)
+    cells = np.flatnonzero(unfilled)
+    filled[cells] += weight[:, None] * (rows - filled[cells])
+    stored, start = (each[:, :3].reshape(*given.shape, 3) for each in (table, filled))
+    filled[cells, :3] = inpaint_texture(unfilled, given, stored, start, confidence)[unfilled]
+    return filled
 
 
 def solve_membrane(hole: Mask, given: Mask, table: Array) -> Array:
-    """Rows [U*V,C] with those of the hole [U,V] solved for: each is the mean of its neighbours.
+    """Rows [U*V,C] with those of the hole [U,V] solved for: each is the mean of its four neighbors.
 
-    Neighbours that are neither given nor in the hole do not count.
+    Neighbors that are neither given nor in the hole do not count.
     """
     unknown = np.flatnonzero(hole.reshape(-1) & ~given.reshape(-1))
     number = np.full(hole.size, -1, np.int64)
     number[unknown] = np.arange(len(unknown))
     height, width = hole.shape
-    pulls, sources, degree = [], np.zeros((len(unknown), table.shape[1])), np.full(len(unknown), 1e-6)
+    links, sources, degree = [], np.zeros((len(unknown), table.shape[1])), np.full(len(unknown), 1e-6)
     y, x = np.divmod(unknown, width)
     for dy, dx in ((0, 1), (1, 0), (0, -1), (-1, 0)):
-        there = (y + dy >= 0) & (y + dy < height) & (x + dx >= 0) & (x + dx < width)
-        other = np.where(there, (y + dy) * width + x + dx, 0)
-        known = there & given.reshape(-1)[other]
-        inner = there & (number[other] >= 0)
-        degree += known.astype(float) + inner
-        np.add.at(sources, np.flatnonzero(known), table[other[known]])
-        pulls.append((np.flatnonzero(inner), number[other[inner]]))
-    rows, columns = (np.concatenate(part) for part in zip(*pulls, strict=True))
-    pull = sparse.csc_matrix((np.ones(len(rows)), (rows, columns)), (len(unknown),) * 2)
-    solve = factorized((sparse.diags(degree) - pull).tocsc())
+        in_grid = (y + dy >= 0) & (y + dy < height) & (x + dx >= 0) & (x + dx < width)
+        other = np.where(in_grid, (y + dy) * width + x + dx, 0)
+        is_given = in_grid & given.reshape(-1)[other]
+        is_unknown = in_grid & (number[other] >= 0)
+        degree += is_given.astype(float) + is_unknown
+        np.add.at(sources, np.flatnonzero(is_given), table[other[is_given]])
+        links.append((np.flatnonzero(is_unknown), number[other[is_unknown]]))
+    rows, columns = (np.concatenate(part) for part in zip(*links, strict=True))
+    adjacency = sparse.csc_matrix((np.ones(len(rows)), (rows, columns)), (len(unknown),) * 2)
+    solve = factorized((sparse.diags(degree) - adjacency).tocsc())
     out = table.copy()
     mean = table[given.reshape(-1)].mean(axis=0) if given.any() else np.zeros(table.shape[1])
     sources += 1e-6 * mean

@@ -1,1 +1,1 @@
-"""Light of edits: ambient occlusion, shadows, irradiance."""
+"""Light models: ambient occlusion, diffuse irradiance, directional light, and changes of light."""

@@ -1,11 +1,11 @@
-"""How bright surfaces are by where they face: what becomes of a part's light when it is turned.
+"""Diffuse irradiance from far away: the change of a part's light when the part is turned.
 
-Light from far away makes a matt surface of unit normal n about as bright as
+A matt surface of unit normal n is about as bright as
 
     1 + a . n,
 
-the first two bands of its irradiance. a is fitted to neighbours of one hue that face different ways: the log
-of their brightness differs by openness, which is known, by texture, of either sign, and by where they face.
+the first two bands of its irradiance. a is fitted to neighbors of one hue with different normals: their log
+brightness differs by openness, which is known, by texture, of either sign, and by their normals.
 
 Source: Ramamoorthi and Hanrahan, "An efficient representation for irradiance environment maps" (2001).
 """
@@ -31,7 +31,7 @@ MAX_NORMAL_PAIRS = 20_000
 """Maximum number of pairs for the fit."""
 
 MAX_PAIR_COSINE = 0.97
-"""Greatest cosine between the normals of a pair."""
+"""Maximum cosine between the normals of a pair."""
 
 NORMAL_NEIGHBORS = 48
 """Number of surfels over which a normal is averaged: rendered depths are rough, and a fit to rough normals
@@ -44,13 +44,13 @@ NORMAL_SMOOTHING_ROUNDS = 2
 """Number of rounds of that average."""
 
 MAX_HUE_DIFFERENCE = 0.2
-"""Greatest difference of a pair's colours over their means: more is another material."""
+"""Maximum difference of the hues of a pair (colors over their means): more is another material."""
 
 PRIOR_COMPONENT_DEVIATION = 0.3
-"""Standard deviation of each component of a, about 0: at 1 the side that faces away would be black."""
+"""Prior standard deviation of each component of a, about 0: at 1 a surface that faces away is black."""
 
 REPEATS_PER_NORMAL_PAIR = 30.0
-"""Pairs that count as one: neighbours, and other views, see the same texture."""
+"""Number of pairs that count as one observation: neighbors, and other views, show the same texture."""
 
 MIN_RELATIVE_BRIGHTNESS = 0.2
 """Minimum of 1 + a . n."""
@@ -67,77 +67,87 @@ MIN_HALF_SHARE = 0.1
 
 @dataclass(frozen=True)
 class DiffuseLight:
-    """Surfaces are brighter the more they face along `towards` [3], a."""
+    """First-order irradiance: brightness 1 + a . n, a the `gradient` [3]."""
 
-    towards: tuple[float, float, float]
+    gradient: tuple[float, float, float]
 
     def log_light(self, normals: AnyArray) -> Array:
-        """The log of how bright surfaces of unit normals [N,3] are, [N]."""
-        return np.asarray(np.log(np.maximum(1.0 + normals @ np.array(self.towards), MIN_RELATIVE_BRIGHTNESS)))
+        """Log brightness [N] of surfaces with unit normals [N,3]."""
+        return np.asarray(
+            np.log(np.maximum(1.0 + normals @ np.array(self.gradient), MIN_RELATIVE_BRIGHTNESS))
+        )
 
 
 @dataclass(frozen=True)
 class NormalPairs:
-    """Neighbours of one hue that face different ways; log_change [N]: of the second's brightness."""
+    """Neighbors of one hue with different normals.
+
+    log_change [N]: log of the second brightness over the first.
+    """
 
     first: Surfels
     second: Surfels
     log_change: Array
 
 
-def sample_normal_pairs(sight: CameraVisibility, apart: Sequence[float], *, seed: int = 0) -> NormalPairs:
-    """Pairs of what is seen of a field, about so far `apart`, world units."""
-    chance = np.random.default_rng(seed)
-    surface, count = sight.surface, len(sight.bright)
+def sample_normal_pairs(
+    visibility: CameraVisibility, distances: Sequence[float], *, seed: int = 0
+) -> NormalPairs:
+    """Pairs of visible surfels, at about each of the `distances` from each other, world units."""
+    rng = np.random.default_rng(seed)
+    surface, count = visibility.surface, len(visibility.log_brightness)
     first, second = np.zeros(0, np.int64), np.zeros(0, np.int64)
-    for distance in apart:
-        rows = chance.choice(count, min(count, MAX_SURFELS_PER_DISTANCE), replace=False)
-        way = chance.normal(size=(len(rows), 3))
-        way *= chance.uniform(0.3, 1.0, (len(rows), 1)) / np.linalg.norm(way, axis=1, keepdims=True)
-        found, there = surface.nearest(surface.points[rows] + distance * way, 1, 0.5 * distance)
-        near = np.isfinite(found[:, 0])
-        first, second = np.append(first, rows[near]), np.append(second, there[near, 0])
+    for distance in distances:
+        rows = rng.choice(count, min(count, MAX_SURFELS_PER_DISTANCE), replace=False)
+        offset = rng.normal(size=(len(rows), 3))
+        offset *= rng.uniform(0.3, 1.0, (len(rows), 1)) / np.linalg.norm(offset, axis=1, keepdims=True)
+        gap, neighbor = surface.nearest(surface.points[rows] + distance * offset, 1, 0.5 * distance)
+        has_neighbor = np.isfinite(gap[:, 0])
+        first, second = np.append(first, rows[has_neighbor]), np.append(second, neighbor[has_neighbor, 0])
     cosine = (surface.normals[first] * surface.normals[second]).sum(axis=1)
-    alike = np.abs(sight.hue[first] - sight.hue[second]).max(axis=1) < MAX_HUE_DIFFERENCE
-    kept = np.flatnonzero((cosine < MAX_PAIR_COSINE) & alike)
-    kept = chance.choice(kept, min(len(kept), MAX_NORMAL_PAIRS), replace=False)
-    first, second = first[kept], second[kept]
-    change = sight.bright[second] - sight.bright[first]
-    reach = min(apart)
+    same_hue = np.abs(visibility.hue[first] - visibility.hue[second]).max(axis=1) < MAX_HUE_DIFFERENCE
+    valid_rows = np.flatnonzero((cosine < MAX_PAIR_COSINE) & same_hue)
+    valid_rows = rng.choice(valid_rows, min(len(valid_rows), MAX_NORMAL_PAIRS), replace=False)
+    first, second = first[valid_rows], second[valid_rows]
+    change = visibility.log_brightness[second] - visibility.log_brightness[first]
+    radius = min(distances)
     return NormalPairs(
-        _smooth_normals(surface, first, reach), _smooth_normals(surface, second, reach), change
+        _smooth_normals(surface, first, radius), _smooth_normals(surface, second, radius), change
     )
 
 
-def _smooth_normals(surface: Surfels, rows: NDArray[np.int64], reach: float) -> Surfels:
-    """Some elements of a surface, their normals means of those around."""
+def _smooth_normals(surface: Surfels, rows: NDArray[np.int64], radius: float) -> Surfels:
+    """Surfels of the given rows, with normals averaged within `radius`, world units."""
     points, normals = surface.points[rows], surface.normals[rows]
-    found, others = surface.nearest(points, NORMAL_NEIGHBORS, reach)
-    near = np.isfinite(found)
-    beside = surface.normals[np.where(near, others, 0)]
+    distance, neighbor_rows = surface.nearest(points, NORMAL_NEIGHBORS, radius)
+    has_neighbor = np.isfinite(distance)
+    neighbor_normals = surface.normals[np.where(has_neighbor, neighbor_rows, 0)]
     for _ in range(NORMAL_SMOOTHING_ROUNDS):
-        normals = average_normals(normals, beside, near, MIN_NEIGHBOR_COSINE)
+        normals = average_normals(normals, neighbor_normals, has_neighbor, MIN_NEIGHBOR_COSINE)
     return Surfels(points, normals)
 
 
 def fit_diffuse_light(first: Surfels, second: Surfels, change: Array) -> DiffuseLight | None:
-    """What explains changes [N] of log brightness between pairs [N] that face different ways, if it does.
+    """Diffuse light that explains changes [N] of log brightness between surfels [N]; None if none does.
 
-    What one half of them says, in space, must hold in the other: else it is where things are that matters.
+    Cross-validation over halves of space: an a fitted to one half must explain the other, else the changes
+    depend on position, not on normals.
     """
     if len(change) < MIN_NORMAL_PAIRS:
         return None
     noise = estimate_noise(change)
     gains: list[float] = []
-    for along in first.points.T:
-        half = along > np.median(along)
-        for one in (half, ~half) if MIN_HALF_SHARE < half.mean() < 1.0 - MIN_HALF_SHARE else ():
-            towards = _fit_gradient(first.take(one), second.take(one), change[one], noise)
-            left, usual = (
-                charbonnier_loss(_residuals(each, first.take(~one), second.take(~one), change[~one], noise))
-                for each in (towards, np.zeros(3))
+    for coordinate in first.points.T:
+        half = coordinate > np.median(coordinate)
+        for fitted in (half, ~half) if MIN_HALF_SHARE < half.mean() < 1.0 - MIN_HALF_SHARE else ():
+            gradient = _fit_gradient(first.take(fitted), second.take(fitted), change[fitted], noise)
+            model_loss, zero_loss = (
+                charbonnier_loss(
+                    _residuals(each, first.take(~fitted), second.take(~fitted), change[~fitted], noise)
+                )
+                for each in (gradient, np.zeros(3))
             )
-            gains.append(1.0 - left / usual if usual > 0.0 else 0.0)
+            gains.append(1.0 - model_loss / zero_loss if zero_loss > 0.0 else 0.0)
     if not gains or np.mean(gains) < MIN_EXPLAINED_LOSS_SHARE:
         return None
     x, y, z = (float(value) for value in _fit_gradient(first, second, change, noise))
@@ -145,17 +155,19 @@ def fit_diffuse_light(first: Surfels, second: Surfels, change: Array) -> Diffuse
 
 
 def _fit_gradient(first: Surfels, second: Surfels, change: Array, noise: float) -> Array:
-    """a [3] of pairs."""
+    """Gradient a [3] fitted to pairs."""
 
-    def residuals(towards: Array) -> Array:
-        left = charbonnier_residuals(_residuals(towards, first, second, change, noise))
-        return np.concatenate([left / np.sqrt(REPEATS_PER_NORMAL_PAIR), towards / PRIOR_COMPONENT_DEVIATION])
+    def residuals(gradient: Array) -> Array:
+        weighted = charbonnier_residuals(_residuals(gradient, first, second, change, noise))
+        return np.concatenate(
+            [weighted / np.sqrt(REPEATS_PER_NORMAL_PAIR), gradient / PRIOR_COMPONENT_DEVIATION]
+        )
 
     return np.asarray(optimize.least_squares(residuals, np.zeros(3)).x)
 
 
-def _residuals(towards: Array, first: Surfels, second: Surfels, change: Array, noise: float) -> Array:
-    """What a [3] leaves over of changes [N], standard deviations."""
-    facing = DiffuseLight((towards[0], towards[1], towards[2]))
-    told = facing.log_light(second.normals) - facing.log_light(first.normals)
-    return np.asarray((told - change) / noise)
+def _residuals(gradient: Array, first: Surfels, second: Surfels, change: Array, noise: float) -> Array:
+    """Residuals [N] of changes [N] for a gradient a [3], standard deviations."""
+    light = DiffuseLight((gradient[0], gradient[1], gradient[2]))
+    predicted = light.log_light(second.normals) - light.log_light(first.normals)
+    return np.asarray((predicted - change) / noise)

@@ -1,4 +1,4 @@
-"""The change of light on a grid block's vertices."""
+"""Change of light on a grid block: the ratio of new to old light at the block's vertices."""
 
 from __future__ import annotations
 
@@ -21,89 +21,101 @@ from cagefield.edits.stack import EditStack
 from cagefield.typing import Array, Mask
 
 MAX_TRUSTED_LOG_GAIN = 0.6
-"""Where light is to grow by more than this (log), what was photographed there is noise: it is filled."""
+"""Gain of light (log) above which the photographed color is noise, and is inpainted."""
 
 LIGHT_NEIGHBORS = 8
-"""Surface elements that the light on a vertex is the mean of."""
+"""Number of surfels over which the light on a vertex is averaged."""
 
 FACING_LOG_WEIGHT = 3.0
-"""How much more surface elements count for a vertex that face as it does: e^FACING across an edge."""
+"""Log weight of a surfel with the normal of the vertex over one at a right angle to it."""
 
 MAX_LIGHT_DEPTH_VOXELS = 10.0
-"""How far from a surface what shows is lit as it is; voxels."""
+"""Maximum distance between a surface and a vertex in the surface's light, voxels."""
 
 
 @dataclass(frozen=True, eq=False)
 class LightChange:
-    """The light on some vertices (`where` [X,Y,Z]) of a block: the log of what it is multiplied by, [N]."""
+    """Log of the ratio of light [N] on the vertices of a mask [X,Y,Z] of a block."""
 
-    where: Mask
+    mask: Mask
     log_ratio: Array
 
     @classmethod
-    def of(cls, block: GridBlock, surface: Surfels, logs: Array, apart: float) -> LightChange:
-        """The light on a block's coloured vertices, by the logs [N] of its surface, so far apart.
+    def from_surfels(cls, block: GridBlock, surface: Surfels, logs: Array, spacing: float) -> LightChange:
+        """Change of light on a block's colored vertices, from log ratios [N] on surfels [N].
 
-        What lies within DEEP of a surface, mostly beneath it, shows through it, as fields are foggy there.
+        spacing: distance of the surfels, world units. Vertices within MAX_LIGHT_DEPTH_VOXELS of a surface,
+        mostly beneath it, show through it, as fields are foggy there.
         """
-        changed = np.flatnonzero(logs)
-        where, log = np.zeros(block.shape, bool), np.zeros(0)
-        if len(changed):
-            reach = MAX_LIGHT_DEPTH_VOXELS * max(block.spacing)
-            g = block.coordinates(surface.points[changed])
+        changed_rows = np.flatnonzero(logs)
+        mask, log = np.zeros(block.shape, bool), np.zeros(0)
+        if len(changed_rows):
+            radius = MAX_LIGHT_DEPTH_VOXELS * max(block.spacing)
+            g = block.block_coordinates(surface.points[changed_rows])
             low = np.maximum(np.floor(g.min(axis=0) - MAX_LIGHT_DEPTH_VOXELS).astype(np.int64), 0)
             high = np.ceil(g.max(axis=0) + MAX_LIGHT_DEPTH_VOXELS).astype(np.int64) + 1
-            part = tuple(slice(a, max(a, b)) for a, b in zip(low, high, strict=True))
-            where[part] = block.slot[part] >= 0
-            found, rows = surface.nearest(block.positions(where), LIGHT_NEIGHBORS, reach)
-            near = np.isfinite(found[:, 0])
-            found, rows = found[near], rows[near]
-            where[where] = near
-            rows = np.where(np.isfinite(found), rows, rows[:, :1])
-            # Around an edge each side has a light of its own; what is thin shows the vertices of both sides.
-            facing = np.abs(np.einsum("nkc,nc->nk", surface.normals[rows], block.normals[where]))
-            weight = np.exp(-0.5 * (found**2 - found[:, :1] ** 2) / apart**2 + FACING_LOG_WEIGHT * facing)
+            box = tuple(slice(a, max(a, b)) for a, b in zip(low, high, strict=True))
+            mask[box] = block.slot[box] >= 0
+            distance, rows = surface.nearest(block.positions(mask), LIGHT_NEIGHBORS, radius)
+            has_surfel = np.isfinite(distance[:, 0])
+            distance, rows = distance[has_surfel], rows[has_surfel]
+            mask[mask] = has_surfel
+            rows = np.where(np.isfinite(distance), rows, rows[:, :1])
+            # Around an edge each side has its own light; a thin object shows the vertices of both sides.
+            facing = np.abs(np.einsum("nkc,nc->nk", surface.normals[rows], block.normals[mask]))
+            weight = np.exp(
+                -0.5 * (distance**2 - distance[:, :1] ** 2) / spacing**2 + FACING_LOG_WEIGHT * facing
+            )
             log = (weight * logs[rows]).sum(axis=1) / weight.sum(axis=1)
-        return cls(where, log)
+        return cls(mask, log)
 
-    def plus(self, other: LightChange) -> LightChange:
-        """Both lights, on vertices of the same block."""
-        where = self.where | other.where
-        dense = np.zeros(where.shape)
+    def combine(self, other: LightChange) -> LightChange:
+        """Product of two changes of light on the same block."""
+        mask = self.mask | other.mask
+        dense = np.zeros(mask.shape)
         for each in (self, other):
-            dense[each.where] += each.log_ratio
-        return LightChange(where, dense[where])
+            dense[each.mask] += each.log_ratio
+        return LightChange(mask, dense[mask])
 
-    def at(self, block: GridBlock, points: Array) -> Array:
-        """The log of the ratio [N] at points [N,3]: that of the vertices around, 0 where there are none."""
-        total = block.lookup(self.where.astype(np.float32), points)
-        return np.asarray(block.lookup(self.dense(block), points) / np.maximum(total, 1e-3))
+    def interpolate(self, block: GridBlock, points: Array) -> Array:
+        """Log ratio [N] at world points [N,3], from the vertices around that have one; 0 without any."""
+        total = block.interpolate(self.mask.astype(np.float32), points)
+        return np.asarray(block.interpolate(self.to_array(block), points) / np.maximum(total, 1e-3))
 
-    def on_grid(self, block: GridBlock) -> NewLight:
-        """The same, for splats. Not of contracted fields."""
-        first = np.zeros(block.shape, bool)
-        first[0, 0, 0] = True
-        values = self.dense(block).astype(np.float32)
+    def to_new_light(self, block: GridBlock) -> NewLight:
+        """Change of light for splats, on a regular grid; not of contracted fields."""
+        corner = np.zeros(block.shape, bool)
+        corner[0, 0, 0] = True
+        values = self.to_array(block).astype(np.float32)
         return NewLight(
-            block.positions(first)[0], np.array(block.spacing), values, self.where.astype(np.float32)
+            block.positions(corner)[0], np.array(block.spacing), values, self.mask.astype(np.float32)
         )
 
-    def dense(self, block: GridBlock) -> Array:
-        """The log of the ratio [X,Y,Z], 0 elsewhere."""
-        out = np.zeros(block.shape)
-        out[self.where] = self.log_ratio
-        return out
+    def to_array(self, block: GridBlock) -> Array:
+        """Log ratio [X,Y,Z]; 0 outside the mask."""
+        values = np.zeros(block.shape)
+        values[self.mask] = self.log_ratio
+        return values
 
 
 def apply_light(block: GridBlock, light: LightChange | None) -> GridBlock:
+    """Block whose colors are denoised and multiplied by a change of light; None changes nothing."""
     if light is None:
         return block
-    return denoise_colors(block, light.where, light.log_ratio).relit(light.where, np.exp(light.log_ratio))
+    return denoise_colors(block, light.mask, light.log_ratio).scale_colors(
+        light.mask, np.exp(light.log_ratio)
+    )
 
 
 def is_reliable(
-    points: Array, below: EditStack, sight: CameraVisibility, block: GridBlock, light: LightChange | None
+    points: Array, below: EditStack, visibility: CameraVisibility, block: GridBlock, light: LightChange | None
 ) -> NDArray[np.bool_]:
-    """Which surface points [N,3] cameras saw well enough for a block's new light."""
-    known = count_edited_views(points, below, sight, DEPTH_TOLERANCE_VOXELS * max(block.spacing)) >= MIN_VIEWS
-    return known if light is None else known & (light.at(block, points) < MAX_TRUSTED_LOG_GAIN)
+    """Mask [N] of surface points [N,3] that cameras saw well enough for the new light of a block.
+
+    A point is reliable if MIN_VIEWS cameras see it, and its light gains at most MAX_TRUSTED_LOG_GAIN.
+    """
+    is_seen = (
+        count_edited_views(points, below, visibility, DEPTH_TOLERANCE_VOXELS * max(block.spacing))
+        >= MIN_VIEWS
+    )
+    return is_seen if light is None else is_seen & (light.interpolate(block, points) < MAX_TRUSTED_LOG_GAIN)

@@ -1,12 +1,12 @@
-"""How strong a part's shade is on what it stands on: measured there, around it.
+"""Strength of a part's contact shadow on its support, fitted to the support around the part.
 
-`Ambience` is fitted to the whole field, to surfaces of all kinds, which light reaches in other ways. Around
-one part its shade is multiplied by the strength s that explains best how the photographed brightness g of its
-support goes down towards it,
+A `LightModel` is fitted to the surfaces of a whole field, which light reaches in many ways. Around one part
+its shade is multiplied by the strength s that best explains the photographed log brightness g of its
+support,
 
     g(p) = a + b . p + log o'(p) - s (log o'(p) - log o(p)),
 
-o the openness with the part, o' without it; a and b are the texture's, and so is what is left over.
+o the openness with the part, o' without it. a and b are the texture's, and so are the residuals.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from cagefield.completion.surfaces.visibility import CameraVisibility
 from cagefield.geometry.cage import Cage
 
 PRIOR_STRENGTH_DEVIATION = 0.3
-"""Standard deviation of strengths, about 1."""
+"""Prior standard deviation of strengths, about 1."""
 
 MIN_STRENGTH = 0.5
 """Minimum strength."""
@@ -33,16 +33,16 @@ MAX_STRENGTH = 2.0
 """Maximum strength."""
 
 MAX_STRENGTH_SURFELS = 6000
-"""Surface elements that are looked at, at most."""
+"""Maximum number of surfels for the fit."""
 
 MIN_SUPPORT_COSINE = 0.9
-"""Least cosine between their normals and the support's."""
+"""Minimum cosine between a surfel's normal and the support's."""
 
 MAX_LOG_SHADE = 0.8
-"""Shade (log) up to which photographs tell how bright it is."""
+"""Shade (log) up to which photos measure brightness."""
 
 TEXTURE_CELL_VOXELS = 8.0
-"""Edge of cells in which texture is the same, voxels."""
+"""Edge of cells of one texture, voxels."""
 
 FIT_ROUNDS = 6
 """Rounds of iteratively reweighted least squares."""
@@ -56,42 +56,49 @@ def fit_shadow_strength(
     others: Surfels,
     block: GridBlock,
     inner: Cage,
-    sight: CameraVisibility | None,
-    ambience: LightModel,
+    visibility: CameraVisibility | None,
+    model: LightModel,
     support: Support,
     *,
     seed: int = 0,
 ) -> float:
-    """The strength of the shade of a part on its support: 1 where photographs say nothing."""
-    if sight is None or not len(part.points):
+    """Strength of a part's contact shadow on its support; 1 where the images say nothing.
+
+    part, others: surfels of the part, and of all else, in a block; inner: V^c; visibility: the field's
+    visible surfaces.
+    """
+    if visibility is None or not len(part.points):
         return 1.0
-    near = np.flatnonzero(part.distance(sight.surface.points, ambience.reach) < ambience.reach)
-    seen, bright = sight.surface.take(near), sight.bright[near]
-    at = block.coordinates(seen.points)
-    along, height = support.local(at)
-    on = np.flatnonzero(
-        (np.abs(height) < PLANE_DISTANCE_VOXELS) & (seen.normals @ support.normal > MIN_SUPPORT_COSINE)
+    near_rows = np.flatnonzero(part.distance(visibility.surface.points, model.max_radius) < model.max_radius)
+    surfels, log_brightness = visibility.surface.take(near_rows), visibility.log_brightness[near_rows]
+    coordinates = block.block_coordinates(surfels.points)
+    uv, height = support.to_local(coordinates)
+    support_rows = np.flatnonzero(
+        (np.abs(height) < PLANE_DISTANCE_VOXELS) & (surfels.normals @ support.normal > MIN_SUPPORT_COSINE)
     )
-    if len(on) > MAX_STRENGTH_SURFELS:
-        on = np.random.default_rng(seed).choice(on, MAX_STRENGTH_SURFELS, replace=False)
-    seen, bright, along = seen.take(on), bright[on], along[on]
-    # The support faces one way, whatever its rough normals say.
-    ambience = replace(ambience, facing=None)
-    alone = ambience.log_light([others], seen)
-    shade = alone - ambience.log_light([others, part], seen)
-    kept = (shade < MAX_LOG_SHADE) & ~inner.contains(seen.points)
-    if kept.sum() < 3:
+    if len(support_rows) > MAX_STRENGTH_SURFELS:
+        support_rows = np.random.default_rng(seed).choice(support_rows, MAX_STRENGTH_SURFELS, replace=False)
+    surfels, log_brightness, uv = surfels.take(support_rows), log_brightness[support_rows], uv[support_rows]
+    # Without the diffuse term: the support is flat, and its normals are rough.
+    model = replace(model, diffuse=None)
+    log_without_part = model.log_light([others], surfels)
+    shade = log_without_part - model.log_light([others, part], surfels)
+    is_used = (shade < MAX_LOG_SHADE) & ~inner.contains(surfels.points)
+    if is_used.sum() < 3:
         return 1.0
-    shade, along, bright = shade[kept], along[kept], (bright - alone)[kept]
-    # What is on one texture's patch, and what several cameras see, counts once.
-    share = len(np.unique(np.floor(along / TEXTURE_CELL_VOXELS), axis=0)) / len(shade)
-    table = np.column_stack([-shade, np.ones(len(shade)), (along - along.mean(axis=0)) / np.ptp(along)])
-    weight, found = np.ones(len(shade)), np.array([1.0, float(np.median(bright + shade)), 0.0, 0.0])
+    shade, uv, log_brightness = shade[is_used], uv[is_used], (log_brightness - log_without_part)[is_used]
+    # Surfels in one cell of texture, and those from several cameras, count as one observation.
+    share = len(np.unique(np.floor(uv / TEXTURE_CELL_VOXELS), axis=0)) / len(shade)
+    table = np.column_stack([-shade, np.ones(len(shade)), (uv - uv.mean(axis=0)) / np.ptp(uv)])
+    weight, solution = (
+        np.ones(len(shade)),
+        np.array([1.0, float(np.median(log_brightness + shade)), 0.0, 0.0]),
+    )
     for _ in range(FIT_ROUNDS):
-        left = bright - table @ found
-        noise = estimate_noise(left)
-        weight = share / np.maximum(1.0, np.abs(left) / (FIT_HUBER_DEVIATIONS * noise)) / noise**2
+        residuals = log_brightness - table @ solution
+        noise = estimate_noise(residuals)
+        weight = share / np.maximum(1.0, np.abs(residuals) / (FIT_HUBER_DEVIATIONS * noise)) / noise**2
         normal = table.T @ (weight[:, None] * table) + np.diag([PRIOR_STRENGTH_DEVIATION**-2, 1e-9, 1.0, 1.0])
-        target = table.T @ (weight * bright) + np.array([PRIOR_STRENGTH_DEVIATION**-2, 0.0, 0.0, 0.0])
-        found = np.linalg.solve(normal, target)
-    return float(np.clip(found[0], MIN_STRENGTH, MAX_STRENGTH))
+        target = table.T @ (weight * log_brightness) + np.array([PRIOR_STRENGTH_DEVIATION**-2, 0.0, 0.0, 0.0])
+        solution = np.linalg.solve(normal, target)
+    return float(np.clip(solution[0], MIN_STRENGTH, MAX_STRENGTH))

@@ -1,1 +1,1 @@
-"""Content pasted from other scenes."""
+"""Content of pastes, read from other scenes."""

@@ -1,11 +1,10 @@
-"""What a paste shows: a cage of another scene, as a layer of this one's grid or as splats.
+"""Content of a paste: a cage of another scene, as a layer of this scene's grid or as splats.
 
-A layer (`fields.voxel_layers`) may hold anything in its block. What V^c holds in the other scene is put
-there by a
-similarity T(p) = q + s (p - p0), and V shows it through the map onto the cage T(V^c). One voxel of the other
-scene becomes one of this grid, so that vertices are copied as they are; where they do not fit, or the other
-grid is no multiple of this one, they are resampled. Directions stay, hence colours do. Where opacity is kept,
-density is divided by s, which |J| of the map has in it; else it stays.
+A layer (`fields.voxel_layers`) may hold anything in its block. The content of V^c in the other scene is put
+there by a similarity T(p) = q + s (p - p0), and V shows it through the map onto the cage T(V^c). One voxel
+of the other scene becomes one of this grid, so that vertices are copied; they are resampled if they do not
+fit, or if the ratio of the grids is no integer. T does not rotate, hence colors stay. With
+`preserve_opacity` density is divided by s, which is a factor of |J| of the map.
 """
 
 from __future__ import annotations
@@ -36,15 +35,15 @@ from cagefield.rendering.splats.splitting import split_for_edits
 from cagefield.typing import Array, Mask
 
 MARGIN_VERTICES = 2
-"""Vertices around T(V^c)."""
+"""Margin of vertices around T(V^c)."""
 
 MAX_RATIO_DIFFERENCE = 1e-6
-"""Voxels whose edges differ by less than this share are of one size."""
+"""Maximum relative difference of edges of voxels of one size."""
 
 
 @dataclass(frozen=True)
 class SourceContent:
-    """Another scene: its field, its edits with their patches, and its opacity choice."""
+    """Another scene: its field, its edits with their patches, and its `preserve_opacity`."""
 
     field: VoxelField | SplatField
     edits: EditStack
@@ -54,9 +53,9 @@ class SourceContent:
 def extract_content(
     content: SourceContent, cage: Cage, field: VoxelField | SplatField, *, preserve_opacity: bool = True
 ) -> Pasted:
-    """What a paste shows in a field: what a cage of another scene holds.
+    """Content of a cage of another scene, as a paste into a field.
 
-    Raises EditError where one of them has voxels and the other one splats, and where the cage holds nothing.
+    Raises EditError if one field has voxels and the other splats, or if the cage is empty.
     """
     check_kinds(content.field, field)
     if isinstance(field, SplatField) and isinstance(content.field, SplatField):
@@ -66,7 +65,7 @@ def extract_content(
 
 
 def check_kinds(source: VoxelField | SplatField, field: VoxelField | SplatField) -> None:
-    """Raises EditError where what one field holds cannot be pasted into another one."""
+    """Raise EditError if the content of one kind of field cannot be pasted into the other."""
     if isinstance(field, SplatField):
         if not isinstance(source, SplatField):
             raise EditError(
@@ -86,17 +85,17 @@ def check_kinds(source: VoxelField | SplatField, field: VoxelField | SplatField)
 
 
 def content_box(field: VoxelField | SplatField) -> Array:
-    """The box [2,3] of what a field holds: of an unbounded one, and of splats, its box of interest."""
+    """World-space box [2,3] of the content of a field; the bounds of an unbounded field, and of splats."""
     if isinstance(field, SplatField) or field.contracted:
         return np.asarray(field.bounds)
     solid = field.vertices[field.density * field.sample_spacing > SOLID_OPTICAL_DEPTH]
     if not len(solid):
         return np.asarray(field.bounds)
-    at = np.stack(np.unravel_index(solid, field.resolution), axis=1)
+    vertices = np.stack(np.unravel_index(solid, field.resolution), axis=1)
     last = np.array(field.resolution) - 1
     low, high = (
-        np.maximum(at.min(axis=0) - MARGIN_VERTICES, 0),
-        np.minimum(at.max(axis=0) + MARGIN_VERTICES, last),
+        np.maximum(vertices.min(axis=0) - MARGIN_VERTICES, 0),
+        np.minimum(vertices.max(axis=0) + MARGIN_VERTICES, last),
     )
     return world_positions(field, np.stack([low, high]))
 
@@ -104,21 +103,25 @@ def content_box(field: VoxelField | SplatField) -> Array:
 def _extract_voxels(
     source: VoxelField, content: SourceContent, cage: Cage, field: VoxelField, preserve_opacity: bool
 ) -> Pasted:
-    fit = _GridPlacement.of(source, cage, field)
-    block = fit.copied(content) if fit.whole else fit.resampled(content)
+    """Content of a cage of voxels, as a layer of the field."""
+    placement = _GridPlacement.from_cage(source, cage, field)
+    block = placement.copy_vertices(content) if placement.is_aligned else placement.resample(content)
     if not (block.density > 0.0).any():
         raise EditError("its cage holds nothing of that scene; move it over something (inner)")
-    density = block.density / np.float32(fit.scale if preserve_opacity else 1.0)
+    density = block.density / np.float32(placement.scale if preserve_opacity else 1.0)
     sh = _resize_harmonics(block.sh, field.sh.shape[1])
-    layer = GridBlock(field, block.low, density, block.slot, sh).layer()
-    return Pasted(part=layer, place=Cage(fit.there(cage.corners), pivot=fit.there(cage.pivot)))
+    layer = GridBlock(field, block.low, density, block.slot, sh).to_layer()
+    return Pasted(
+        part=layer, place=Cage(placement.transform(cage.corners), pivot=placement.transform(cage.pivot))
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class _GridPlacement:
-    """T: a vertex `first` [3] of the source's grid lies on the vertex `low` [3] of the field's.
+    """Similarity T that puts vertex `first` [3] of the source's grid on vertex `low` [3] of the field's.
 
-    shape [3]: vertices of the field's block; ratio [3]: voxels of the source along one of the block.
+    shape [3]: vertices of the field's block; scale: s; ratio [3]: voxels of the source along one of the
+    block.
     """
 
     source: VoxelField
@@ -130,27 +133,30 @@ class _GridPlacement:
     ratio: Array
 
     @classmethod
-    def of(cls, source: VoxelField, cage: Cage, field: VoxelField) -> _GridPlacement:
-        own, other = field.voxel_size, source.voxel_size
+    def from_cage(cls, source: VoxelField, cage: Cage, field: VoxelField) -> _GridPlacement:
+        """Placement of a cage of the source in the field. Raises EditError if the field is too small."""
+        voxel, source_voxel = field.voxel_size, source.voxel_size
         low, last = np.zeros(3, np.int64), np.array(field.resolution) - 1
         if field.contracted:
             low, last = -(-last // 4), 3 * last // 4
         box = cage.aabb
-        middle = (np.array(source.resolution) - 1) / 2.0
-        first = np.floor((box[0] - source.center) / other + middle).astype(np.int64) - MARGIN_VERTICES
-        start = _uniform_position(source, first)
-        room = (last - low - MARGIN_VERTICES - 1) * own
-        if (room <= 0.0).any():
+        center = (np.array(source.resolution) - 1) / 2.0
+        first = np.floor((box[0] - source.center) / source_voxel + center).astype(np.int64) - MARGIN_VERTICES
+        source_start = _uniform_position(source, first)
+        available = (last - low - MARGIN_VERTICES - 1) * voxel
+        if (available <= 0.0).any():
             raise EditError(
                 "this scene's grid is too small to hold anything from another one; train it finer"
             )
-        scale = float(min((own / other).max(), (room / (box[1] - start)).min()))
-        shape = np.ceil(scale * (box[1] - start) / own).astype(np.int64) + MARGIN_VERTICES
-        return cls(source, field, first, low, np.minimum(shape, last - low + 1), scale, own / scale / other)
+        scale = float(min((voxel / source_voxel).max(), (available / (box[1] - source_start)).min()))
+        shape = np.ceil(scale * (box[1] - source_start) / voxel).astype(np.int64) + MARGIN_VERTICES
+        return cls(
+            source, field, first, low, np.minimum(shape, last - low + 1), scale, voxel / scale / source_voxel
+        )
 
     @property
-    def whole(self) -> bool:
-        """True where vertices lie on vertices."""
+    def is_aligned(self) -> bool:
+        """Whether vertices of the source lie on vertices of the field."""
         inside = True
         if self.source.contracted:
             ends = np.stack([self.first, self.first + self.shape])
@@ -160,7 +166,7 @@ class _GridPlacement:
             (np.abs(self.ratio - 1.0) * self.shape < MAX_RATIO_DIFFERENCE * self.shape.max()).all()
         )
 
-    def there(self, points: Array) -> Array:
+    def transform(self, points: Array) -> Array:
         """T of points [N,3]."""
         start, end = (
             _uniform_position(self.source, self.first),
@@ -168,75 +174,81 @@ class _GridPlacement:
         )
         return np.asarray(end + self.scale * (points - start))
 
-    def copied(self, content: SourceContent) -> GridBlock:
-        """The source's own vertices, at their place in the field's grid."""
+    def copy_vertices(self, content: SourceContent) -> GridBlock:
+        """Block of copies of the source's vertices."""
         ends = np.stack([self.first + 1, self.first + self.shape - 2])
         last = np.array(self.source.resolution) - 1
         box = world_positions(self.source, np.clip(ends, 0, last))
         block = extract_block(self.source, content.edits, box, preserve_opacity=content.preserve_opacity)
         skipped = np.maximum(self.first - block.low, 0)
-        block = block.cropped(skipped, self.first + self.shape - 1 - block.low)
+        block = block.crop(skipped, self.first + self.shape - 1 - block.low)
         return replace(block, low=block.low - self.first + self.low)
 
-    def resampled(self, content: SourceContent) -> GridBlock:
-        """The source between its vertices, at those of the field's grid."""
+    def resample(self, content: SourceContent) -> GridBlock:
+        """Block of samples of the source at the vertices of the field's grid."""
         density, slot = np.zeros(self.shape, np.float32), np.full(self.shape, -1, np.int64)
         start, edge = _uniform_position(self.source, self.first), self.field.voxel_size / self.scale
-        near = np.flatnonzero(self._near(content, start, edge))
-        kept, sh = 0, []
-        for begin in range(0, len(near), VERTICES_PER_BATCH):
-            rows = near[begin : begin + VERTICES_PER_BATCH]
-            at = np.stack(np.unravel_index(rows, self.shape), axis=1)
-            raw, colours = sample_edited_field(
-                self.source, content.edits, start + at * edge, preserve_opacity=content.preserve_opacity
+        rows_near = np.flatnonzero(self._near_mask(content, start, edge))
+        count, sh = 0, []
+        for begin in range(0, len(rows_near), VERTICES_PER_BATCH):
+            rows = rows_near[begin : begin + VERTICES_PER_BATCH]
+            vertices = np.stack(np.unravel_index(rows, self.shape), axis=1)
+            values, coefficients = sample_edited_field(
+                self.source, content.edits, start + vertices * edge, preserve_opacity=content.preserve_opacity
             )
-            found = (raw != 0.0) | colours.any(axis=(1, 2))
-            density.flat[rows] = raw
-            slot.flat[rows[found]] = kept + np.arange(int(found.sum()))
-            kept += int(found.sum())
-            sh.append(colours[found])
+            is_stored = (values != 0.0) | coefficients.any(axis=(1, 2))
+            density.flat[rows] = values
+            slot.flat[rows[is_stored]] = count + np.arange(int(is_stored.sum()))
+            count += int(is_stored.sum())
+            sh.append(coefficients[is_stored])
         none = np.zeros((0, *self.source.sh.shape[1:]), np.float32)
         return GridBlock(self.field, self.low, density, slot, np.concatenate([none, *sh]))
 
-    def _near(self, content: SourceContent, start: Array, edge: Array) -> Mask:
-        """Vertices [X,Y,Z] of the block beside which the source stores something, or its edits reach."""
+    def _near_mask(self, content: SourceContent, start: Array, edge: Array) -> Mask:
+        """Mask [X,Y,Z] of the block's vertices beside a stored vertex of the source, or in the boxes of
+        its edits.
+        """
         stored = np.zeros(self.source.resolution, bool)
         stored.reshape(-1)[self.source.vertices] = True
         stored = ndimage.maximum_filter(stored, 3)
-        near = np.zeros(self.shape, bool)
-        nx, *others = self.shape
-        rest = np.stack(np.meshgrid(*(np.arange(n) for n in others), indexing="ij"), axis=-1).reshape(-1, 2)
+        mask = np.zeros(self.shape, bool)
+        nx, *plane_shape = self.shape
+        plane_vertices = np.stack(
+            np.meshgrid(*(np.arange(n) for n in plane_shape), indexing="ij"), axis=-1
+        ).reshape(-1, 2)
         last = np.array(self.source.resolution) - 1
         for x in range(nx):
-            points = start + np.concatenate([np.full((len(rest), 1), x), rest], axis=1) * edge
+            points = (
+                start + np.concatenate([np.full((len(plane_vertices), 1), x), plane_vertices], axis=1) * edge
+            )
             g = np.round(self.source.grid_coordinates(points)).astype(np.int64)
             inside = ((g >= 0) & (g <= last)).all(axis=1)
             plane = inside & stored[tuple(np.clip(g, 0, last).T)]
             for box in content.edits.boxes:
                 plane |= ((points >= box[0]) & (points <= box[1])).all(axis=1)
-            near[x] = plane.reshape(others)
-        return near
+            mask[x] = plane.reshape(plane_shape)
+        return mask
 
 
 def _uniform_position(field: VoxelField, vertex: NDArray[np.int64]) -> Array:
-    """World position [3] of a vertex, of an unbounded field as if voxels had one size everywhere."""
+    """World position [3] of a vertex; of an unbounded field as if all voxels had one size."""
     return np.asarray(field.center + (vertex - (np.array(field.resolution) - 1) / 2.0) * field.voxel_size)
 
 
 def _extract_splats(source: SplatField, content: SourceContent, cage: Cage, field: SplatField) -> SplatField:
-    """The splats in a cage of another scene, those that its faces cut in parts."""
+    """Splats in a cage of another scene; those that its faces cut are split."""
     edited = baked_splats(source, content.edits, preserve_opacity=content.preserve_opacity)
     edited = split_for_edits(edited, EditStack([Edit.delete(cage)]))
     inside = cage.contains(edited.means.astype(np.float64))
     if not inside.any():
         raise EditError("its cage holds nothing of that scene; move it over something (inner)")
-    found = edited.take(inside)
-    return replace(found, antialiased=field.antialiased, discs=field.discs)
+    content_splats = edited.take(inside)
+    return replace(content_splats, antialiased=field.antialiased, discs=field.discs)
 
 
 def _resize_harmonics(sh: NDArray[np.float32], terms: int) -> NDArray[np.float32]:
-    """Harmonics [N,terms,3]: cut, or with zeros of higher degrees."""
+    """Coefficients [N,terms,3]: truncated, or padded with zeros."""
     out = np.zeros((len(sh), terms, 3), np.float32)
-    few = min(terms, sh.shape[1])
-    out[:, :few] = sh[:, :few]
+    count = min(terms, sh.shape[1])
+    out[:, :count] = sh[:, :count]
     return out

@@ -1,4 +1,4 @@
-"""What pastes show, read from other scenes when it is asked for, and kept while it is."""
+"""Loader of the content of pastes, with a cache of the latest."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.fields.voxel_layers import layer_slices
 
 MAX_UNUSED_PASTES = 4
-"""Pastes that are kept beside those that were asked for last: undo takes one back."""
+"""Number of pastes in memory besides those last used: undo brings one back."""
 
 MAX_PASTED_VERTICES = 1 << 29
-"""Vertices of the grid's slices of all pastes together: 2 GB of their index."""
+"""Maximum number of vertices in the slices of the grid of all pastes: 2 GB of their index."""
 
 
 class SceneLibrary(Protocol):
-    """Where pastes get scenes from."""
+    """Source of the scenes of pastes."""
 
     def state(self, source: str) -> Hashable:
-        """What changes where the scene of a source does. Raises EditError for one that is not there."""
+        """Value that changes with the scene. Raises EditError for a missing scene."""
 
     def read(self, source: str) -> SourceContent:
-        """The scene of a source. Raises CagefieldError where it cannot be read."""
+        """Content of the scene. Raises CagefieldError if it cannot be read."""
 
 
 class PasteLoader:
-    """Gives pastes into one field what they show."""
+    """Content of pastes into one field."""
 
     def __init__(self, library: SceneLibrary) -> None:
         self._library = library
-        self._kept: dict[Hashable, Pasted] = {}
+        self._cache: dict[Hashable, Pasted] = {}
 
     def read(
         self,
@@ -45,44 +45,45 @@ class PasteLoader:
         preserve_opacity: bool = True,
         proceed: Callable[[], None] | None = None,
     ) -> list[Edit]:
-        """The edits, those of them that paste with what they show.
+        """Edits, with the content of those that paste.
 
-        Raises EditError, in words of the edit, where a scene is not there or cannot be pasted.
+        Raises EditError, which names the edit, if a scene is missing or cannot be pasted.
         """
-        found, used = [], {}
+        loaded, used = [], {}
         for edit in edits:
             if edit.source is not None and edit.enabled:
                 if proceed is not None:
                     proceed()
-                key, shown = self._shown(edit, edit.source, field, preserve_opacity)
-                used[key] = shown
-                edit = edit.replace(pasted=shown)
-            found.append(edit)
+                key, content = self._load(edit, edit.source, field, preserve_opacity)
+                used[key] = content
+                edit = edit.replace(pasted=content)
+            loaded.append(edit)
         if used and isinstance(field, VoxelField):
             _check_size(used.values(), field)
-        others = [(key, shown) for key, shown in self._kept.items() if key not in used]
-        self._kept = dict(others[-MAX_UNUSED_PASTES:]) | used
-        return found
+        unused = [(key, content) for key, content in self._cache.items() if key not in used]
+        self._cache = dict(unused[-MAX_UNUSED_PASTES:]) | used
+        return loaded
 
-    def _shown(
+    def _load(
         self, edit: Edit, source: str, field: VoxelField | SplatField, preserve_opacity: bool
     ) -> tuple[Hashable, Pasted]:
+        """(cache key, content) of a paste."""
         try:
             key = (self._library.state(source), edit.inner, preserve_opacity)
-            if key not in self._kept:
+            if key not in self._cache:
                 content = self._library.read(source)
-                self._kept[key] = extract_content(
+                self._cache[key] = extract_content(
                     content, edit.inner, field, preserve_opacity=preserve_opacity
                 )
         except EditError as error:
             raise edit.cannot_paste(str(error)) from None
         except CagefieldError as error:
             raise edit.cannot_paste(f"it cannot be read: {error}") from None
-        return key, self._kept[key]
+        return key, self._cache[key]
 
 
 def _check_size(pastes: Iterable[Pasted], field: VoxelField) -> None:
-    """Raises EditError where pastes take too much memory."""
+    """Raise EditError if pastes need too much memory."""
     _, ny, nz = field.resolution
     ends = [layer_slices(each.part) for each in pastes if each.part is not None]
     vertices = sum(high - low for low, high in ends) * ny * nz

@@ -1,1 +1,1 @@
-"""Surfaces beside an edit: visibility, surfels, supports."""
+"""Surfaces around an edit: visibility, surfels, support planes, footprints."""

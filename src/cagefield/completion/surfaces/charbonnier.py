@@ -1,4 +1,8 @@
-"""Huber's loss, smoothed, of what a fit leaves over: edges of textures are further off than noise.
+"""Charbonnier loss of a fit's residuals: quadratic for noise, linear for outliers such as edges of textures.
+
+    rho(r) = 2 h^2 (sqrt(1 + (r / h)^2) - 1),    h = HUBER_DEVIATIONS,
+
+of residuals r in standard deviations.
 
 Source: Charbonnier et al., "Deterministic edge-preserving regularization in computed imaging" (1997).
 """
@@ -10,27 +14,27 @@ import numpy as np
 from cagefield.typing import Array
 
 HUBER_DEVIATIONS = 3.0
-"""Standard deviations of noise from which on what is left counts by its size, no longer by its square."""
+"""Residual from which on the loss is linear, standard deviations."""
 
 
 MIN_LOG_DEVIATION = 1e-3
-"""Least standard deviation of logs of brightness: a thousandth cannot be seen."""
+"""Minimum standard deviation of log brightness: a change of a thousandth is invisible."""
 
 
 def estimate_noise(values: Array) -> float:
-    """The standard deviation of values [N] but for those far off, by their median; at least LEAST."""
+    """Robust standard deviation of values [N], by their median absolute deviation; >= MIN_LOG_DEVIATION."""
     return max(1.4826 * float(np.median(np.abs(values - np.median(values)))), MIN_LOG_DEVIATION)
 
 
-def charbonnier_residuals(left: Array) -> Array:
-    """What is left over [N], in standard deviations, so that its squares are the loss."""
+def charbonnier_residuals(residuals: Array) -> Array:
+    """Residuals [N] whose squares are the loss rho of `residuals` [N], with their sign, for least squares."""
     return np.asarray(
-        np.sign(left)
+        np.sign(residuals)
         * HUBER_DEVIATIONS
-        * np.sqrt(2.0 * (np.sqrt(1.0 + (left / HUBER_DEVIATIONS) ** 2) - 1.0))
+        * np.sqrt(2.0 * (np.sqrt(1.0 + (residuals / HUBER_DEVIATIONS) ** 2) - 1.0))
     )
 
 
-def charbonnier_loss(left: Array) -> float:
-    """The mean loss of what is left over [N]."""
-    return float((charbonnier_residuals(left) ** 2).mean())
+def charbonnier_loss(residuals: Array) -> float:
+    """Mean loss of residuals [N], in standard deviations."""
+    return float((charbonnier_residuals(residuals) ** 2).mean())

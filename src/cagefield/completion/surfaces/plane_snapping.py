@@ -1,7 +1,7 @@
-"""Floors, tables and walls: surface elements that lie on large planes are put on them.
+"""Plane snapping of surfels: floors, tables and walls get the normal of their plane.
 
-A field's surfaces have bumps that nobody sees in its pictures, most of all where they have one colour; light
-that is worked out on bumps is blotched. Where many surface elements share a plane they get its normal.
+A field's surfaces have bumps that no photo shows, most of all where they have one color; light computed on
+bumps is blotched. RANSAC finds the largest planes, and the surfels on them are moved onto them.
 
 Source: Schnabel, Wahl and Klein, "Efficient RANSAC for point-cloud shape detection" (2007), for the search.
 """
@@ -22,7 +22,7 @@ TRIALS_PER_PLANE = 120
 """RANSAC hypotheses per plane."""
 
 MAX_SURFELS_PER_TRIAL = 4000
-"""Surface elements that are counted in a trial, at most."""
+"""Maximum number of surfels on which hypotheses are scored."""
 
 INLIER_DISTANCE_VOXELS = 1.5
 """Maximum distance of an inlier from its plane, voxels."""
@@ -53,82 +53,88 @@ MAX_CENTROID_OFFSET_SHARE = 0.5
 their mean distance."""
 
 
-def flattened(
+def snap_to_planes(
     surface: Surfels, voxel: float, *, seed: int = 0, edges: bool = False
 ) -> tuple[Surfels, NDArray[np.bool_]]:
-    """(the surface elements [N], those on planes with the planes' normals; which of them are on planes).
+    """(surfels [N], those on planes with their plane's position and normal; mask [N] of the surfels on
+    planes).
 
-    With `edges`, what is tilted or off a plane is put on it only amid what surely lies on it: bumps are, and
-    the rounded edge of a table, beyond which there is nothing, is not.
+    With `edges`, a surfel that is tilted or off its plane is moved only if inliers of the plane surround
+    it: a bump is moved, the rounded edge of a table is not. `voxel` is in world units.
     """
     points, normals = surface.points.copy(), surface.normals.copy()
-    left = np.ones(len(points), bool)
-    chance = np.random.default_rng(seed)
+    unassigned = np.ones(len(points), bool)
+    rng = np.random.default_rng(seed)
     for _ in range(MAX_PLANES):
-        rows = np.flatnonzero(left)
+        rows = np.flatnonzero(unassigned)
         if len(rows) < MIN_INLIERS:
             break
-        found = _plane(points[rows], normals[rows], voxel, chance)
-        if found is None:
+        plane = _fit_plane(points[rows], normals[rows], voxel, rng)
+        if plane is None:
             break
-        centre, normal = found
-        height = (points[rows] - centre) @ normal
-        facing = normals[rows] @ normal
-        on = (np.abs(height) < SNAP_DISTANCE_VOXELS * voxel) & (facing > MIN_SNAP_COSINE)
+        center, normal = plane
+        distance = (points[rows] - center) @ normal
+        cosine = normals[rows] @ normal
+        is_near = (np.abs(distance) < SNAP_DISTANCE_VOXELS * voxel) & (cosine > MIN_SNAP_COSINE)
         if edges:
-            sure = on & (np.abs(height) < INLIER_DISTANCE_VOXELS * voxel) & (facing > MIN_INLIER_COSINE)
-            on = sure | _amid(
-                points[rows] - height[:, None] * normal, on & ~sure, sure, NEIGHBOR_RADIUS_VOXELS * voxel
+            is_inlier = (
+                is_near & (np.abs(distance) < INLIER_DISTANCE_VOXELS * voxel) & (cosine > MIN_INLIER_COSINE)
             )
-        on = rows[on]
-        if len(on) < max(MIN_INLIERS, MIN_INLIER_SHARE * len(points)):
+            is_near = is_inlier | _is_surrounded(
+                points[rows] - distance[:, None] * normal,
+                is_near & ~is_inlier,
+                is_inlier,
+                NEIGHBOR_RADIUS_VOXELS * voxel,
+            )
+        is_near = rows[is_near]
+        if len(is_near) < max(MIN_INLIERS, MIN_INLIER_SHARE * len(points)):
             break
-        points[on] -= ((points[on] - centre) @ normal)[:, None] * normal
-        normals[on] = normal
-        left[on] = False
-    return Surfels(points, normals), ~left
+        points[is_near] -= ((points[is_near] - center) @ normal)[:, None] * normal
+        normals[is_near] = normal
+        unassigned[is_near] = False
+    return Surfels(points, normals), ~unassigned
 
 
-def _amid(
-    points: Array, which: NDArray[np.bool_], sure: NDArray[np.bool_], reach: float
+def _is_surrounded(
+    points: Array, candidate_mask: NDArray[np.bool_], sure: NDArray[np.bool_], radius: float
 ) -> NDArray[np.bool_]:
-    """Which of some surface elements' points [N] on a plane have others of it, that are sure, all around."""
-    out = np.zeros(len(points), bool)
-    at = np.flatnonzero(which)
-    if not len(at) or not sure.any():
-        return out
-    found, rows = cKDTree(points[sure]).query(
-        points[at], k=[*range(1, MAX_NEIGHBORS + 1)], distance_upper_bound=reach, workers=-1
+    """Mask [N] of points on a plane, among `candidate_mask` [N], that `sure` inliers [N] surround."""
+    is_inside = np.zeros(len(points), bool)
+    candidates = np.flatnonzero(candidate_mask)
+    if not len(candidates) or not sure.any():
+        return is_inside
+    distance, rows = cKDTree(points[sure]).query(
+        points[candidates], k=[*range(1, MAX_NEIGHBORS + 1)], distance_upper_bound=radius, workers=-1
     )
-    near = np.isfinite(found)
+    near = np.isfinite(distance)
     count = np.maximum(near.sum(axis=1), 1)
-    away = np.where(near[..., None], points[sure][np.where(near, rows, 0)] - points[at, None], 0.0)
-    aside = np.linalg.norm(away.sum(axis=1), axis=1) / count
-    out[at] = near[:, 0] & (
-        aside < MAX_CENTROID_OFFSET_SHARE * np.where(near, found, 0.0).sum(axis=1) / count
+    offset = np.where(near[..., None], points[sure][np.where(near, rows, 0)] - points[candidates, None], 0.0)
+    centroid_distance = np.linalg.norm(offset.sum(axis=1), axis=1) / count
+    is_inside[candidates] = near[:, 0] & (
+        centroid_distance < MAX_CENTROID_OFFSET_SHARE * np.where(near, distance, 0.0).sum(axis=1) / count
     )
-    return out
+    return is_inside
 
 
-def _plane(
-    points: Array, normals: Array, voxel: float, chance: np.random.Generator
+def _fit_plane(
+    points: Array, normals: Array, voxel: float, rng: np.random.Generator
 ) -> tuple[Array, Array] | None:
-    """(a point [3], the normal [3]) of the plane that most surface elements support, None where few do."""
-    some = chance.choice(len(points), min(MAX_SURFELS_PER_TRIAL, len(points)), replace=False)
-    tried = chance.choice(len(points), min(TRIALS_PER_PLANE, len(points)), replace=False)
-    height = points[some] @ normals[tried].T - (points[tried] * normals[tried]).sum(axis=1)
-    supports = (np.abs(height) < INLIER_DISTANCE_VOXELS * voxel) & (
-        normals[some] @ normals[tried].T > MIN_INLIER_COSINE
+    """(point [3], normal [3]) of the plane with the most inliers, or None below MIN_INLIERS."""
+    sample = rng.choice(len(points), min(MAX_SURFELS_PER_TRIAL, len(points)), replace=False)
+    hypotheses = rng.choice(len(points), min(TRIALS_PER_PLANE, len(points)), replace=False)
+    distance = points[sample] @ normals[hypotheses].T - (points[hypotheses] * normals[hypotheses]).sum(axis=1)
+    is_inlier = (np.abs(distance) < INLIER_DISTANCE_VOXELS * voxel) & (
+        normals[sample] @ normals[hypotheses].T > MIN_INLIER_COSINE
     )
-    best = tried[int(np.argmax(supports.sum(axis=0)))]
-    centre, normal = points[best], normals[best]
+    best = hypotheses[int(np.argmax(is_inlier.sum(axis=0)))]
+    center, normal = points[best], normals[best]
     for _ in range(3):
-        mine = (np.abs((points - centre) @ normal) < INLIER_DISTANCE_VOXELS * voxel) & (
+        is_inlier = (np.abs((points - center) @ normal) < INLIER_DISTANCE_VOXELS * voxel) & (
             normals @ normal > MIN_INLIER_COSINE
         )
-        if mine.sum() < MIN_INLIERS:
+        if is_inlier.sum() < MIN_INLIERS:
             return None
-        centre = points[mine].mean(axis=0)
-        across = np.linalg.eigh(np.cov((points[mine] - centre).T))[1][:, 0]
-        normal = across if across @ normal > 0.0 else -across
-    return centre, normal
+        center = points[is_inlier].mean(axis=0)
+        axis = np.linalg.eigh(np.cov((points[is_inlier] - center).T))[1][:, 0]
+        normal = axis if axis @ normal > 0.0 else -axis
+    return center, normal

@@ -1,4 +1,4 @@
-"""Splats on a voxel grid: where patches of splats are worked out."""
+"""Voxelization of splats: a voxel field on which patches of splats are computed."""
 
 from __future__ import annotations
 
@@ -13,55 +13,56 @@ from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.typing import Array, Mask
 
 MAX_BOUNDS_VOXELS = 128
-"""Voxels along the longest edge of the bounds of splats of which light is found out about."""
+"""Voxels along the longest edge of the bounds of splats, for the fit of a light model."""
 
 MIN_DEVIATION_VOXELS = 0.6
-"""Least standard deviation of a splat, voxels: a thinner one would be missed between vertices."""
+"""Minimum standard deviation of a splat, voxels: a thinner one falls between vertices."""
 
 SPLAT_RADIUS_DEVIATIONS = 2.5
-"""Standard deviations around its mean at which a splat is asked for."""
+"""Radius around its mean in which a splat is evaluated, standard deviations."""
 
 MIN_OPTICAL_DEPTH = 0.005
-"""Optical depth per voxel that is left out."""
+"""Optical depth per voxel below which a vertex is not stored."""
 
 GRID_VERTEX_RANGE = (40, 112)
-"""Vertices along the longest edge of a grid that splats are worked out on, at least and at most."""
+"""Minimum and maximum number of vertices along the longest edge of a grid."""
 
 
 def max_voxel_size(box: Array) -> float:
-    """The largest edge that a voxel has for a world-space box [2,3]."""
+    """Maximum edge of a voxel for a world-space box [2,3], world units."""
     return float((box[1] - box[0]).max()) / GRID_VERTEX_RANGE[0]
 
 
 def choose_voxel_size(splats: SplatField, box: Array) -> float:
-    """The edge of a voxel, world units, that shows what splats in a world-space box [2,3] show."""
+    """Edge of a voxel, world units, that resolves the splats in a world-space box [2,3]."""
     inside = ((splats.means >= box[0]) & (splats.means <= box[1])).all(axis=1)
-    most = max_voxel_size(box)
-    least = most * GRID_VERTEX_RANGE[0] / GRID_VERTEX_RANGE[1]
+    largest = max_voxel_size(box)
+    smallest = largest * GRID_VERTEX_RANGE[0] / GRID_VERTEX_RANGE[1]
     if not inside.any():
-        return most
-    return float(np.clip(splats.take(inside).sample_spacing, least, most))
+        return largest
+    return float(np.clip(splats.take(inside).sample_spacing, smallest, largest))
 
 
 def voxelize_splats(splats: SplatField, box: Array, voxel: float) -> VoxelField:
-    """What splats are in a world-space box [2,3]: densities, and colours that are the same all around.
+    """Voxel field of splats in a world-space box [2,3]: density, and a color that is the same in all
+    directions.
 
-    `voxel` is a voxel's edge, world units; the box grows to a whole number of them.
+    `voxel` is the edge of a voxel, world units; the box grows to a whole number of voxels.
     """
     count = np.maximum(np.ceil((box[1] - box[0]) / voxel).astype(np.int64), 2) + 1
     bounds = box.mean(axis=0) + 0.5 * voxel * (count - 1) * np.array([[-1.0], [1.0]])
-    near = _widen_splats(splats, bounds, voxel)
-    asked = _covered_vertices(near, bounds[0], voxel, count)
-    points = (bounds[0] + voxel * np.argwhere(asked)).astype(np.float32)
-    vertices = np.flatnonzero(asked)
+    wide = _widen_splats(splats, bounds, voxel)
+    covered = _covered_vertices(wide, bounds[0], voxel, count)
+    points = (bounds[0] + voxel * np.argwhere(covered)).astype(np.float32)
+    vertices = np.flatnonzero(covered)
     density, sh = np.zeros(0, np.float32), np.zeros((0, 1, 3), np.float32)
-    if len(near) and len(points):
+    if len(wide) and len(points):
         mixture = SplatMixture.build(
-            near.means, near.log_scales, near.quaternions, near.opacities, near.sh[:, :1]
+            wide.means, wide.log_scales, wide.quaternions, wide.opacities, wide.sh[:, :1]
         )
         density = mixture.grid_sigma(points)
-        kept = density * voxel > MIN_OPTICAL_DEPTH
-        density, vertices, points = density[kept], vertices[kept], points[kept]
+        is_stored = density * voxel > MIN_OPTICAL_DEPTH
+        density, vertices, points = density[is_stored], vertices[is_stored], points[is_stored]
         up = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (len(points), 1, 1))
         sh = ((mixture.evaluate(points, up)[1] - 0.5) / C0).astype(np.float32)
     else:
@@ -70,17 +71,17 @@ def voxelize_splats(splats: SplatField, box: Array, voxel: float) -> VoxelField:
 
 
 def voxelize_bounds(splats: SplatField) -> VoxelField:
-    """What splats are in their bounds, as coarsely as light is found out about."""
+    """Voxel field of splats in their bounds, at the resolution of the fit of a light model."""
     edge = float((splats.bounds[1] - splats.bounds[0]).max())
     return voxelize_splats(splats, splats.bounds, edge / MAX_BOUNDS_VOXELS)
 
 
 def _widen_splats(splats: SplatField, bounds: Array, voxel: float) -> SplatField:
-    """The splats that reach into a box, none thinner than a vertex can see."""
+    """Splats that reach into a box [2,3], none thinner than MIN_DEVIATION_VOXELS."""
     scales = np.maximum(np.exp(splats.log_scales), np.float32(MIN_DEVIATION_VOXELS * voxel))
-    reach = SPLAT_RADIUS_DEVIATIONS * scales.max(axis=1, keepdims=True)
-    seen = (splats.means + reach >= bounds[0]) & (splats.means - reach <= bounds[1])
-    rows = np.flatnonzero(seen.all(axis=1) & (splats.opacities > 0.02))
+    radius = SPLAT_RADIUS_DEVIATIONS * scales.max(axis=1, keepdims=True)
+    is_near = (splats.means + radius >= bounds[0]) & (splats.means - radius <= bounds[1])
+    rows = np.flatnonzero(is_near.all(axis=1) & (splats.opacities > 0.02))
     return SplatField(
         splats.means[rows],
         np.log(scales[rows]),
@@ -92,14 +93,14 @@ def _widen_splats(splats: SplatField, bounds: Array, voxel: float) -> SplatField
 
 
 def _covered_vertices(splats: SplatField, low: Array, voxel: float, count: NDArray[np.int64]) -> Mask:
-    """Vertices [X,Y,Z] of a grid that the boxes of splats cover."""
+    """Mask [X,Y,Z] of a grid's vertices in the bounding boxes of splats."""
     axes = rotation_matrices(splats.quaternions.astype(np.float64))
     half = SPLAT_RADIUS_DEVIATIONS * np.sqrt(
         np.einsum("nij,nj->ni", axes**2, np.exp(2.0 * splats.log_scales))
     )
     first = np.clip(np.ceil((splats.means - half - low) / voxel).astype(np.int64), 0, count)
     end = np.clip(np.floor((splats.means + half - low) / voxel).astype(np.int64) + 1, 0, count)
-    # Boxes as differences at their corners, whose sums along the axes count how many cover a vertex.
+    # A box is a pattern of signs at its corners; cumulative sums along the axes count the boxes at a vertex.
     steps = np.zeros(count + 1, np.int32)
     for corner in range(8):
         upper = np.array([corner & 1, corner >> 1 & 1, corner >> 2 & 1], bool)

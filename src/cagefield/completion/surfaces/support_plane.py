@@ -1,4 +1,4 @@
-"""What a thing stood on, or hung from: the plane of surfaces around it that it touches from above."""
+"""Support planes: the plane of the surfaces that a part stands on, or hangs from."""
 
 from __future__ import annotations
 
@@ -8,55 +8,58 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.completion.surfaces.plane_snapping import flattened
+from cagefield.completion.surfaces.plane_snapping import snap_to_planes
 from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.typing import Array, Mask
 
 PLANE_TRIALS = 200
-"""Planes that are tried."""
+"""Number of RANSAC hypotheses."""
 
 PLANE_DISTANCE_VOXELS = 1.5
-"""A surface vertex belongs to a plane within this distance, voxels."""
+"""Maximum distance of an inlier from its plane, voxels."""
 
 MIN_PLANE_COSINE = 0.9
-"""Least cosine between its normal and the plane's."""
+"""Minimum cosine between the normals of an inlier and of its plane."""
 
 MIN_MEMBER_COSINE = 0.6
-"""The same of all that lie on it, where normals may be noise."""
+"""Minimum cosine between the normals of a member, which may be noisy, and of the support."""
 
 MAX_CANDIDATE_PLANES = 4
-"""Planes that are looked at."""
+"""Maximum number of planes that are examined."""
 
 MIN_HALF_WIDTH_VOXELS = 3
-"""Half the least width of a support, voxels."""
+"""Minimum half width of a support, voxels."""
 
 MIN_SUPPORT_SURFELS = 60
-"""Vertices of a support, at least."""
+"""Minimum number of surfels of a support."""
 
 
 @dataclass(frozen=True)
 class Support:
-    """A plane with normal [3], u and v axes [2,3], through a point, in units of voxels of a block."""
+    """Plane with a normal [3] and axes u and v [2,3] through a point [3], in block coordinates (voxels).
+
+    members [N,3]: block coordinates of the surfels on the plane.
+    """
 
     point: Array
     normal: Array
     axes: Array
     members: Array
 
-    def local(self, at: Array) -> tuple[Array, Array]:
-        """(u and v [N,2], height [N]) of block coordinates [N,3]."""
-        away = at - self.point
-        return away @ self.axes.T, away @ self.normal
+    def to_local(self, at: Array) -> tuple[Array, Array]:
+        """(u and v [N,2], height over the plane [N]) of block coordinates [N,3]."""
+        offset = at - self.point
+        return offset @ self.axes.T, offset @ self.normal
 
 
 def find_support(
     part: Mask, surface: Surfels, at: Array, near: NDArray[np.bool_], voxel: float
 ) -> Support | None:
-    """The support of a part [X,Y,Z] among those of a surface's elements [N], `at` [N,3], that are near.
+    """Support of a part [X,Y,Z] on the planes among the surfels [N] that are near the part; None without one.
 
-    Large planes among these have one normal, and only what lies on one is a support.
+    at [N,3]: the surfels' block coordinates; near [N]: the candidates; voxel: world units.
     """
-    flat, on = flattened(surface.take(near), voxel)
+    flat, on = snap_to_planes(surface.take(near), voxel)
     normals, ring = surface.normals.copy(), np.zeros(len(at), bool)
     normals[near], ring[near] = flat.normals, on
     return fit_support(part, at, normals, ring)
@@ -65,82 +68,86 @@ def find_support(
 def fit_support(
     part: Mask, at: Array, normals: Array, ring: NDArray[np.bool_], *, seed: int = 0
 ) -> Support | None:
-    """The plane through surfaces of the ring [N] that the part [X,Y,Z] stands on, or just over.
+    """Plane through the surfels of the ring [N] that the part [X,Y,Z] stands on, or hangs just over.
 
-    at, normals [N,3]: block coordinates of all surfaces, and their normals. Each counts by how near the part
-    comes to it from above. All that are on the plane are its members.
+    at, normals [N,3]: block coordinates and normals of all surfels. RANSAC weights each surfel by its
+    distance from the part along the normal. All surfels on the plane become its members.
     """
-    ring, content = ring.copy(), np.argwhere(part).astype(np.float64)
+    ring, vertices = ring.copy(), np.argwhere(part).astype(np.float64)
     for _ in range(MAX_CANDIDATE_PLANES):
-        if ring.sum() < MIN_SUPPORT_SURFELS or not len(content):
+        if ring.sum() < MIN_SUPPORT_SURFELS or not len(vertices):
             break
-        found = _fit_plane(part, content, at[ring], normals[ring], seed)
-        if found is None:
+        plane = _fit_plane(part, vertices, at[ring], normals[ring], seed)
+        if plane is None:
             break
-        on = np.abs((at - found[0]) @ found[1]) < PLANE_DISTANCE_VOXELS
-        support = _build_support(*found, at, normals)
-        if _is_wide(support.local(at[on & (normals @ found[1] > MIN_MEMBER_COSINE)])[0]):
+        is_near = np.abs((at - plane[0]) @ plane[1]) < PLANE_DISTANCE_VOXELS
+        support = _build_support(*plane, at, normals)
+        if _is_wide(support.to_local(at[is_near & (normals @ plane[1] > MIN_MEMBER_COSINE)])[0]):
             return support
-        ring &= ~on
+        ring &= ~is_near
     return None
 
 
 def _fit_plane(
-    part: Mask, content: Array, at: Array, normals: Array, seed: int
+    part: Mask, vertices: Array, at: Array, normals: Array, seed: int
 ) -> tuple[Array, Array] | None:
-    """(a point [3], the normal [3]) of the plane of surfaces [N] that the part's content [M,3] stands on."""
-    size = float(np.median(np.ptp(content, axis=0))) + 1.0
-    reach = max(4.0, 0.25 * size)
-    from_part = ndimage.distance_transform_edt(~part)
-    near = ndimage.map_coordinates(from_part, (at + reach * normals).T, order=1, mode="nearest")
-    shade = np.clip(1.0 - near / (2.0 * reach), 0.02, 1.0)
-    chance = np.random.default_rng(seed)
-    some = chance.choice(len(at), min(len(at), 6000), replace=False)
-    probes = content[chance.choice(len(content), min(len(content), 2000), replace=False)]
-    best, most = None, 0.0
-    for row in chance.choice(len(at), min(PLANE_TRIALS, len(at)), replace=False, p=shade / shade.sum()):
+    """(point [3], normal [3]) of the plane of surfels [N] under the vertices [M,3] of a part; None without
+    one.
+    """
+    size = float(np.median(np.ptp(vertices, axis=0))) + 1.0
+    probe = max(4.0, 0.25 * size)
+    part_distance = ndimage.distance_transform_edt(~part)
+    distance = ndimage.map_coordinates(part_distance, (at + probe * normals).T, order=1, mode="nearest")
+    weight = np.clip(1.0 - distance / (2.0 * probe), 0.02, 1.0)
+    rng = np.random.default_rng(seed)
+    sample = rng.choice(len(at), min(len(at), 6000), replace=False)
+    probes = vertices[rng.choice(len(vertices), min(len(vertices), 2000), replace=False)]
+    best, best_score = None, 0.0
+    for row in rng.choice(len(at), min(PLANE_TRIALS, len(at)), replace=False, p=weight / weight.sum()):
         n = normals[row].astype(np.float64)
-        height = (at[some] - at[row]) @ n
-        found = (np.abs(height) < PLANE_DISTANCE_VOXELS) & (normals[some] @ n > MIN_PLANE_COSINE)
-        score = float(shade[some][found].sum())
-        if score <= most:
+        height = (at[sample] - at[row]) @ n
+        is_inlier = (np.abs(height) < PLANE_DISTANCE_VOXELS) & (normals[sample] @ n > MIN_PLANE_COSINE)
+        score = float(weight[sample][is_inlier].sum())
+        if score <= best_score:
             continue
-        above = (probes - at[row]) @ n
-        if (above < -PLANE_DISTANCE_VOXELS - 1.0).mean() < 0.05 and np.percentile(above, 3) < max(
-            4.0, 0.3 * size
-        ):
-            best, most = row, score
+        probe_height = (probes - at[row]) @ n
+        if (probe_height < -PLANE_DISTANCE_VOXELS - 1.0).mean() < 0.05 and np.percentile(
+            probe_height, 3
+        ) < max(4.0, 0.3 * size):
+            best, best_score = row, score
     if best is None:
         return None
-    n, centre = normals[best].astype(np.float64), at[best]
+    n, center = normals[best].astype(np.float64), at[best]
     for _ in range(3):
         member = np.flatnonzero(
-            (np.abs((at - centre) @ n) < PLANE_DISTANCE_VOXELS) & (normals @ n > MIN_PLANE_COSINE)
+            (np.abs((at - center) @ n) < PLANE_DISTANCE_VOXELS) & (normals @ n > MIN_PLANE_COSINE)
         )
         if len(member) < MIN_SUPPORT_SURFELS:
             return None
-        centre = at[member].mean(axis=0)
-        spread = np.linalg.eigh(np.cov((at[member] - centre).T))[1][:, 0]
-        n = spread if spread @ n > 0.0 else -spread
-    return centre, n
+        center = at[member].mean(axis=0)
+        axis = np.linalg.eigh(np.cov((at[member] - center).T))[1][:, 0]
+        n = axis if axis @ n > 0.0 else -axis
+    return center, n
 
 
-def _build_support(centre: Array, n: Array, at: Array, normals: Array) -> Support:
-    """The support on a plane with normal n [3], of surfaces [N]."""
+def _build_support(center: Array, n: Array, at: Array, normals: Array) -> Support:
+    """Support on the plane through `center` [3] with normal n [3], of surfels [N]."""
     aside = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
     aside /= np.linalg.norm(aside)
-    member = (np.abs((at - centre) @ n) < 2.0 * PLANE_DISTANCE_VOXELS) & (normals @ n > MIN_MEMBER_COSINE)
+    is_member = (np.abs((at - center) @ n) < 2.0 * PLANE_DISTANCE_VOXELS) & (normals @ n > MIN_MEMBER_COSINE)
     # Columns begin at a vertex: between two of them, half of the vertices would share a column.
-    vertex = np.round(centre)
-    point = vertex + ((centre - vertex) @ n) * n
-    return Support(point, n, np.stack([aside, np.cross(n, aside)]), at[member])
+    vertex = np.round(center)
+    point = vertex + ((center - vertex) @ n) * n
+    return Support(point, n, np.stack([aside, np.cross(n, aside)]), at[is_member])
 
 
 def _is_wide(uv: Array) -> bool:
-    """False for columns [N,2] that form nothing but strips: a plane that leans on edges."""
+    """Whether columns [N,2] contain a square of half width MIN_HALF_WIDTH_VOXELS: a plane on mere edges is a
+    strip.
+    """
     cell = np.round(uv).astype(np.int64)
     cell -= cell.min(axis=0)
-    found = np.zeros(cell.max(axis=0) + 2 * MIN_HALF_WIDTH_VOXELS + 1, bool)
-    found[tuple((cell + MIN_HALF_WIDTH_VOXELS).T)] = True
-    found = ndimage.binary_closing(found, iterations=2)
-    return int(ndimage.binary_opening(found, iterations=MIN_HALF_WIDTH_VOXELS).sum()) >= MIN_SUPPORT_SURFELS
+    columns = np.zeros(cell.max(axis=0) + 2 * MIN_HALF_WIDTH_VOXELS + 1, bool)
+    columns[tuple((cell + MIN_HALF_WIDTH_VOXELS).T)] = True
+    columns = ndimage.binary_closing(columns, iterations=2)
+    return int(ndimage.binary_opening(columns, iterations=MIN_HALF_WIDTH_VOXELS).sum()) >= MIN_SUPPORT_SURFELS

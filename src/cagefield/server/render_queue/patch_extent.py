@@ -47,4 +47,4 @@ def _box(edit: Edit, voxel: float, reach: float) -> Array:
     falls = NO_SHADOW_DIRECTIONS if edit.relight in ("occlusion", "none") else ANY_SHADOW_DIRECTIONS
     if edit.adjustment == "continuous":
         return light_box(edit, voxel, reach, falls)
-    return patch_box(edit, voxel, reach, falls=falls)
+    return patch_box(edit, voxel, reach, shadow_directions=falls)

@@ -69,7 +69,7 @@ class EditedRenderers:
             shown = [edit if id(edit) in ready else self._quickly(edit) for edit in shown]
         # Occupancy under edits that both share is kept.
         last = self._exact[-1:] if exact else (self._quick or self._exact[-1:])
-        stack = self._patcher.patched(
+        stack = self._patcher.prepare(
             shown, moving=not exact, preserve_opacity=preserve_opacity, proceed=proceed
         )
         renderer = (last[0].renderer if last else self._plain).with_edits(

@@ -88,7 +88,7 @@ class PageFiles:
         began, proceed = time.perf_counter(), giving_up(stop)
         try:
             patcher = self._renderers.scene.patcher
-            edits = patcher.patched(shown, moving=not task.exact, proceed=proceed)
+            edits = patcher.prepare(shown, moving=not task.exact, proceed=proceed)
             changed = changed_splats(
                 field,
                 edits,

@@ -142,7 +142,7 @@ class TaskHandlers:
             field, edits = content.field, content.edits
         else:
             below = self._renderers.edits(task.shown.edits)
-            edits = self._renderers.scene.patcher.patched(below, moving=True, preserve_opacity=False)
+            edits = self._renderers.scene.patcher.prepare(below, moving=True, preserve_opacity=False)
         if isinstance(field, SplatField):
             return dense(task.cage, deformed_splats(field, edits)).tolist()
         from cagefield.rendering.edited_field import EditedField
