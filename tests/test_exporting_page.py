@@ -184,7 +184,7 @@ class _Patches:
     def __init__(self, moving: Patch, settled: Patch) -> None:
         self.moving, self.settled = moving, settled
 
-    def patched(
+    def prepare(
         self,
         edits: Sequence[Edit],
         *,

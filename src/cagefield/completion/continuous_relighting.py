@@ -56,8 +56,9 @@ MIN_BENT_LOG_CHANGE = 0.03
 
 
 def light_box(edit: Edit, voxel: float, max_radius: float, shadow_directions: Array) -> Array:
-    """World-space box [2,3] (min, max) in which a continuous edit changes light; arguments as in
-    `patch_box`.
+    """World-space box [2,3] (min, max) in which a continuous edit changes light.
+
+    Arguments as in `patch_box`.
     """
     assert edit.outer is not None
     margin = 1.5 * max_radius + SUPPORT_DISTANCE_VOXELS * voxel
@@ -145,11 +146,11 @@ def inpaint_shaded_support(
     The block is in its new light, which amplifies the noise of colors photographed in deep shade.
     """
     coordinates = block.block_coordinates(bent.surface.points)
-    dark = bent.log > MIN_FILLED_LOG_GAIN
-    if not dark.any():
+    is_dark = bent.log > MIN_FILLED_LOG_GAIN
+    if not is_dark.any():
         return block, None
     # Crop to the dark surfels and a margin of half their extent.
-    low, high = coordinates[dark].min(axis=0), coordinates[dark].max(axis=0)
+    low, high = coordinates[is_dark].min(axis=0), coordinates[is_dark].max(axis=0)
     margin = max(MIN_MARGIN_VOXELS, 0.5 * float((high - low).max()))
     first = np.maximum(np.floor(low - margin), 0.0).astype(np.int64)
     crop = block.crop(first, np.ceil(high + margin).astype(np.int64))
@@ -157,14 +158,14 @@ def inpaint_shaded_support(
     support = _find_part_support(crop, inside, edit, bent, coordinates - first)
     if support is None:
         return block, None
-    inpainted = _inpaint_shaded(crop, inside, bent, coordinates - first, dark, support, below, visibility)
+    inpainted = _inpaint_shaded(crop, inside, bent, coordinates - first, is_dark, support, below, visibility)
     if inpainted is None:
         return block, None
     slices = tuple(slice(a, a + n) for a, n in zip(crop.low - block.low, crop.shape, strict=True))
     density, slot = block.density.copy(), block.slot.copy()
     density[slices], slot[slices] = inpainted.density, inpainted.slot
-    whole = replace(block, density=density, slot=slot, sh=inpainted.sh)
-    return whole, replace(support, point=support.point + first, members=support.members + first)
+    inpainted_block = replace(block, density=density, slot=slot, sh=inpainted.sh)
+    return inpainted_block, replace(support, point=support.point + first, members=support.members + first)
 
 
 def _find_part_support(
@@ -177,8 +178,8 @@ def _find_part_support(
     distance = ndimage.distance_transform_edt(~inside)
     distance = np.asarray(ndimage.map_coordinates(distance, coordinates.T, order=1, cval=np.inf))
     size = float(np.median(np.subtract(*edit.inner.aabb[::-1]))) / max(block.spacing)
-    near = (distance > 0.0) & (distance < max(SUPPORT_DISTANCE_VOXELS, 0.5 * size))
-    return find_support(part, bent.surface, coordinates, near, max(bent.block.spacing))
+    is_near = (distance > 0.0) & (distance < max(SUPPORT_DISTANCE_VOXELS, 0.5 * size))
+    return find_support(part, bent.surface, coordinates, is_near, max(bent.block.spacing))
 
 
 def _inpaint_shaded(
@@ -186,17 +187,17 @@ def _inpaint_shaded(
     inside: Mask,
     bent: BentLight,
     coordinates: Array,
-    dark: NDArray[np.bool_],
+    is_dark: NDArray[np.bool_],
     support: Support,
     below: EditStack,
     visibility: CameraVisibility | None,
 ) -> GridBlock | None:
     """Block with a support inpainted; None without a footprint.
 
-    coordinates [N,3]: block coordinates of the surfels; dark [N]: mask of the surfels in deep shade.
+    coordinates [N,3]: block coordinates of the surfels; is_dark [N]: mask of the surfels in deep shade.
     """
     part = block.solid & inside
-    shaded = Surfels(coordinates[dark], bent.surface.normals[dark])
+    shaded = Surfels(coordinates[is_dark], bent.surface.normals[is_dark])
     footprint = build_footprint(support, part, np.zeros((0, 3)), shaded)
     if footprint is None:
         return None

@@ -86,12 +86,12 @@ class EditContext:
         after: VoxelField | None,
         visibility: CameraVisibility | None,
     ) -> EditContext:
-        # The field's visible surfaces are not where the edits below have moved them.
         """Context of an edit of a field under the edits below.
 
         model: the light model, None to leave light as it is; after: the field with a paste, if `edit` does
         not hold its content.
         """
+        # The field's visible surfaces are not where the edits below have moved them.
         visibility = None if below.active else visibility
         include_destination = include_destination and not edit.deleted
         voxel = float(field.voxel_size.max())
@@ -220,8 +220,9 @@ class EditContext:
         return self.remaining.downsample(self.light_spacing)
 
     def light_change_without_part(self, model: LightModel) -> Array:
-        """Log ratio of light [N] on `light_surfels` after the removal of the part; 0 where the source
-        stays.
+        """Log ratio of light [N] on `light_surfels` after the removal of the part.
+
+        0 where the edit keeps its source.
         """
         if self.edit.keep_source or not len(self.removed.points):
             return np.zeros(len(self.light_surfels.points))
@@ -237,8 +238,7 @@ class EditContext:
     def light_change_at_destination(
         self, under: GridBlock, footprint: Footprint | None, model: LightModel, strength: float
     ) -> tuple[LightChange, LightChange | None]:
-        """(change of light on a block, change of light on the part or None) with the part at its
-        destination.
+        """(change of light on a block, on the part or None) with the part at its destination.
 
         under: the block without the part; footprint: its inpainted columns; strength: of the part's shade
         on it. A paste keeps its own light.
@@ -257,17 +257,19 @@ class EditContext:
             return LightChange.from_surfels(under, light_surfels, log, self.light_spacing), None
         part, moved = self._move(self.removed)
         # With its cut faces: the part is solid at its destination, not a shell.
-        whole = concatenate_surfels([moved, self._move(extract_cut_faces(self.before, self.edit.inner))[1]])
+        moved_solid = concatenate_surfels(
+            [moved, self._move(extract_cut_faces(self.before, self.edit.inner))[1]]
+        )
         log = strength * _log_light_change(
-            model, light_surfels, [remaining, whole], [remaining], whole, self.voxel
+            model, light_surfels, [remaining, moved_solid], [remaining], moved_solid, self.voxel
         )
         change = LightChange.from_surfels(under, light_surfels, log, self.light_spacing)
         before = [self.surroundings, self.removed]
-        log = model.log_light([remaining, whole], moved) - model.log_light(before, part)
+        log = model.log_light([remaining, moved_solid], moved) - model.log_light(before, part)
         log = np.where(np.abs(log) < MIN_LOG_CHANGE, 0.0, log)
         on_part = LightChange.from_surfels(self.before, part, log, self.light_spacing)
-        where = on_part.mask & self.inside
-        return change, LightChange(where, on_part.log_ratio[self.inside[on_part.mask]])
+        mask = on_part.mask & self.inside
+        return change, LightChange(mask, on_part.log_ratio[self.inside[on_part.mask]])
 
     def _move(self, surface: Surfels) -> tuple[Surfels, Surfels]:
         """(surfels inside V^c, the same surfels at the destination)."""
@@ -276,10 +278,9 @@ class EditContext:
         return part, part.transform(points, jacobian)
 
     def extract_part(self, block: GridBlock, destination: GridBlock) -> GridBlock | None:
-        """Block of the part as shown at its destination, feathered into `destination`; None if it is
-        unchanged.
+        """Block of the part as shown at its destination; None if it is unchanged.
 
-        Vertices away from the part have no color.
+        The part is feathered into `destination`. Vertices away from the part have no color.
         """
         feather = self.edit.feather if self.include_destination and self.edit.source is None else 0.0
         if block is self.before and feather == 0.0:

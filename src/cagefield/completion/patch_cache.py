@@ -193,7 +193,7 @@ class DiskCache:
                 self._update_digest(digest, each)
         elif dataclasses.is_dataclass(value) and not isinstance(value, type):
             if isinstance(value, Edit) and (value.pasted is not None or value.source is not None):
-                raise TypeError("what is pasted may change")
+                raise TypeError("the content of a paste may change")
             digest.update(type(value).__name__.encode())
             for each in _init_fields(value):
                 if not (isinstance(value, Edit) and each.name == "name"):

@@ -105,8 +105,9 @@ class Patcher:
     def _composite(
         self, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
     ) -> Pasted | None:
-        """Content of a paste, composited with the field beneath; a moving one without the field, unless
-        cached.
+        """Content of a paste, composited with the field beneath.
+
+        While the paste moves, its content alone, unless the composite is cached.
         """
         assert isinstance(self._field, VoxelField)  # splats need no compositing
         stack = EditStack(below)
@@ -233,9 +234,9 @@ class Patcher:
             return None if light is None else light.patch
 
         patch = self._disk_cache.get_or_make(("light", model, *stack.active, edit), make)
-        found = None if patch is None else light_edit(edit, patch)
-        self._store(key, found)
-        return found
+        relighting = None if patch is None else light_edit(edit, patch)
+        self._store(key, relighting)
+        return relighting
 
     def _store(self, key: Key, value: Patch | SplatPatch | Edit | None) -> None:
         """Store a patch, and drop the oldest beyond MAX_CACHED_PATCHES."""

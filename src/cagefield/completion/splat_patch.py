@@ -149,14 +149,14 @@ def _crop_splats(field: SplatField, moved: MovedSplats, box: Array) -> MovedSpla
     """Splats whose extent reaches into a box [2,3] enlarged by half."""
     box = box + 0.25 * (box[1] - box[0]) * np.array([[-1.0], [1.0]])
 
-    def reaches(points: AnyArray, rows: NDArray[np.int64] | slice) -> Mask:
-        reach = 3.0 * np.exp(field.log_scales[rows].max(axis=1, keepdims=True))
-        return np.asarray(((points + reach >= box[0]) & (points - reach <= box[1])).all(axis=1))
+    def is_near_box(points: AnyArray, rows: NDArray[np.int64] | slice) -> Mask:
+        radius = 3.0 * np.exp(field.log_scales[rows].max(axis=1, keepdims=True))
+        return np.asarray(((points + radius >= box[0]) & (points - radius <= box[1])).all(axis=1))
 
-    is_near = reaches(moved.points, moved.source)
+    is_near = is_near_box(moved.points, moved.source)
     gains = None if moved.gains is None else moved.gains[is_near]
-    left = moved.left | ~reaches(field.means, slice(None))
-    return MovedSplats(left, moved.source[is_near], moved.points[is_near], moved.jacobian[is_near], gains)
+    has_left = moved.left | ~is_near_box(field.means, slice(None))
+    return MovedSplats(has_left, moved.source[is_near], moved.points[is_near], moved.jacobian[is_near], gains)
 
 
 def _to_new_light(block: GridBlock, light: LightChange | None) -> NewLight:

@@ -130,9 +130,7 @@ def _trace_lines(
 
 
 def _rim_means(lines: _Lines, which: NDArray[np.int64], given: Mask, table: Array) -> Array:
-    """Mean values [N,C] of the given columns beyond the ends of some lines [N], straight along their
-    headings.
-    """
+    """Mean values [N,C] of the given columns straight beyond the ends of some lines [N]."""
     total, count = np.zeros((len(which), table.shape[1])), np.zeros(len(which))
     for step in range(RIM_SAMPLE_COLUMNS):
         cell = np.round(lines.end[which] + step * lines.heading[which]).astype(np.int64)

@@ -156,8 +156,9 @@ def _complete_level(
 
 
 def _texture_weight(level: _Level, columns: NDArray[np.int64], difference: Array) -> Array:
-    """Weight [U,V] of the texture, from the differences [N] of patches around columns [N,2] from their
-    matches.
+    """Weight [U,V] of the texture against the initial colors.
+
+    difference [N]: relative difference of the patches around columns [N,2] from their matches.
     """
     is_given = level.given[tuple(columns.T)]
     unknown, weight = np.ones(level.given.shape, bool), np.zeros(level.given.shape)
@@ -184,8 +185,8 @@ class _PatchDescriptor:
         rows = _weight_patches(patches[:MAX_PCA_PATCHES])
         mean = rows.mean(axis=0)
         last = rows.shape[1] - 1
-        spread = (rows - mean).T @ (rows - mean)
-        return cls(mean, eigh(spread, subset_by_index=(max(0, last - MAX_COMPONENTS + 1), last))[1])
+        scatter = (rows - mean).T @ (rows - mean)
+        return cls(mean, eigh(scatter, subset_by_index=(max(0, last - MAX_COMPONENTS + 1), last))[1])
 
     def __call__(self, patches: Array) -> Array:
         """Descriptors [N,D] of patches [N,K,C]."""
@@ -194,9 +195,10 @@ class _PatchDescriptor:
 
 def _upsample(values: Array, shape: tuple[int, ...]) -> Array:
     """Bilinear interpolation [*shape,C] of values [U,V,C] at twice the resolution."""
-    at = np.meshgrid(*(0.5 * np.arange(size) for size in shape[:2]), indexing="ij")
+    positions = np.meshgrid(*(0.5 * np.arange(size) for size in shape[:2]), indexing="ij")
     channels = [
-        ndimage.map_coordinates(values[..., c], at, order=1, mode="nearest") for c in range(values.shape[-1])
+        ndimage.map_coordinates(values[..., c], positions, order=1, mode="nearest")
+        for c in range(values.shape[-1])
     ]
     return np.stack(channels, axis=-1)
 
@@ -232,8 +234,9 @@ def _weight_patches(patches: Array) -> Array:
 def _match_patches(
     image: Array, columns: NDArray[np.int64], descriptor: _PatchDescriptor, descriptors: Array
 ) -> tuple[NDArray[np.int64], Array]:
-    """(nearest rows [N] of descriptors [M,D], squared distances [N]) of an image's patches around columns
-    [N,2].
+    """(nearest rows [N] of descriptors [M,D], squared distances [N]) of patches of an image.
+
+    columns [N,2]: centers of the patches.
     """
     rows, distance = np.zeros(len(columns), np.int64), np.zeros(len(columns))
     squared_norm, padded = (descriptors**2).sum(axis=1), _pad_edges(image)

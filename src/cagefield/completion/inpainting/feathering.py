@@ -1,5 +1,4 @@
-"""Feathering: the rim of a moved part blended into its destination, without a seam where the cage cuts
-matter.
+"""Feathering: the rim of a moved part blended into its destination, for cuts without a seam.
 
 In a rim along the faces of V^c, `width` voxels wide, the part's density and color are mixed with those of
 the destination: w of its own and 1 - w of the destination's, w rising from 0 at the faces to 1. The part's

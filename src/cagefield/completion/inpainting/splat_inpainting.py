@@ -143,8 +143,9 @@ class KnownSplats:
         return np.asarray(coordinates + change[:, None] * support.normal)
 
     def _match_colors(self, rows: NDArray[np.int64], colors: Array) -> NDArray[np.int64]:
-        """Rows [A], among `rows`, of the splats to copy: nearest in color to [A,3], with little view
-        dependence.
+        """Rows [A], among `rows`, of the splats to copy.
+
+        Copied splats are nearest in color to [A,3], with little view dependence.
         """
         splat_log, target_log = (
             np.log(np.maximum(rgb, MIN_DIVISOR_COLOR)) for rgb in (self.mean_colors(rows), colors)

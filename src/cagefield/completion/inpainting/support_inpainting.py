@@ -115,9 +115,7 @@ def inpaint_support(
 
 
 def _columns_beneath(footprint: Footprint, vertices: NDArray[np.int64]) -> Mask:
-    """Mask [U,V] of the columns under block coordinates [N,3] of a part, with a margin of
-    BLEND_WIDTH_COLUMNS.
-    """
+    """Mask [U,V] of the columns under vertices [N,3] of a part, dilated by BLEND_WIDTH_COLUMNS."""
     u, v, _ = footprint.locate(vertices.astype(np.float64))
     columns = np.zeros(footprint.hole.shape, bool)
     columns[u[u >= 0], v[u >= 0]] = True

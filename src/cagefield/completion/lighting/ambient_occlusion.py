@@ -143,8 +143,9 @@ def occlusion_radii(field: VoxelField) -> tuple[float, ...]:
 
 
 def fit_light_model(field: VoxelField, visibility: CameraVisibility) -> LightModel:
-    """Light model whose weights explain the visible colors of a field; without diffuse and directional
-    terms.
+    """Light model whose weights explain the visible colors of a field.
+
+    Without diffuse and directional terms; without radii for a field with too few pairs or solid vertices.
     """
     pairs = visibility.pairs
     if len(pairs.log_change) < MIN_FIT_SAMPLES or _solid_vertices(field).size < MIN_FIT_SAMPLES:

@@ -82,17 +82,21 @@ def fit_shadow_strength(
     # Without the diffuse term: the support is flat, and its normals are rough.
     model = replace(model, diffuse=None)
     log_without_part = model.log_light([others], surfels)
-    shade = log_without_part - model.log_light([others, part], surfels)
-    is_used = (shade < MAX_LOG_SHADE) & ~inner.contains(surfels.points)
+    log_shade = log_without_part - model.log_light([others, part], surfels)
+    is_used = (log_shade < MAX_LOG_SHADE) & ~inner.contains(surfels.points)
     if is_used.sum() < 3:
         return 1.0
-    shade, uv, log_brightness = shade[is_used], uv[is_used], (log_brightness - log_without_part)[is_used]
+    log_shade, uv, log_brightness = (
+        log_shade[is_used],
+        uv[is_used],
+        (log_brightness - log_without_part)[is_used],
+    )
     # Surfels in one cell of texture, and those from several cameras, count as one observation.
-    share = len(np.unique(np.floor(uv / TEXTURE_CELL_VOXELS), axis=0)) / len(shade)
-    table = np.column_stack([-shade, np.ones(len(shade)), (uv - uv.mean(axis=0)) / np.ptp(uv)])
+    share = len(np.unique(np.floor(uv / TEXTURE_CELL_VOXELS), axis=0)) / len(log_shade)
+    table = np.column_stack([-log_shade, np.ones(len(log_shade)), (uv - uv.mean(axis=0)) / np.ptp(uv)])
     weight, solution = (
-        np.ones(len(shade)),
-        np.array([1.0, float(np.median(log_brightness + shade)), 0.0, 0.0]),
+        np.ones(len(log_shade)),
+        np.array([1.0, float(np.median(log_brightness + log_shade)), 0.0, 0.0]),
     )
     for _ in range(FIT_ROUNDS):
         residuals = log_brightness - table @ solution

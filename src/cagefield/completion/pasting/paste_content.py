@@ -205,9 +205,7 @@ class _GridPlacement:
         return GridBlock(self.field, self.low, density, slot, np.concatenate([none, *sh]))
 
     def _near_mask(self, content: SourceContent, start: Array, edge: Array) -> Mask:
-        """Mask [X,Y,Z] of the block's vertices beside a stored vertex of the source, or in the boxes of
-        its edits.
-        """
+        """Mask [X,Y,Z] of the block's vertices beside a stored vertex of the source, or in its edits."""
         stored = np.zeros(self.source.resolution, bool)
         stored.reshape(-1)[self.source.vertices] = True
         stored = ndimage.maximum_filter(stored, 3)

@@ -89,6 +89,6 @@ def _check_size(pastes: Iterable[Pasted], field: VoxelField) -> None:
     vertices = sum(high - low for low, high in ends) * ny * nz
     if vertices > MAX_PASTED_VERTICES:
         raise EditError(
-            f"what is pasted takes {vertices / 1e6:.0f} million vertices of this scene's grid, at most"
-            f" {MAX_PASTED_VERTICES / 1e6:.0f} million are kept; paste less, or the same cage several times"
+            f"the pastes take {vertices / 1e6:.0f} million vertices of this scene's grid, more than"
+            f" the limit of {MAX_PASTED_VERTICES / 1e6:.0f} million; paste less, or one cage several times"
         )

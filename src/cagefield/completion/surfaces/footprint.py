@@ -111,8 +111,9 @@ class Footprint:
         return columns
 
     def locate(self, coordinates: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-        """(u [N], v [N], height over the surface [N]) of block coordinates [N,3]; u is -1 outside the
-        grid.
+        """(u [N], v [N], height over the surface [N]) of block coordinates [N,3].
+
+        u is -1 outside the grid.
         """
         uv, height = self.support.to_local(coordinates)
         cell = np.round(uv).astype(np.int64) - self.first
@@ -123,8 +124,7 @@ class Footprint:
 
 
 def build_footprint(support: Support, part: Mask, contact: Array, shaded: Surfels) -> Footprint | None:
-    """Footprint of a part [X,Y,Z]: columns under the part, hidden by the part, or in deep shade; None
-    without one.
+    """Footprint of a part [X,Y,Z]: columns under it, hidden by it, or in deep shade; None without one.
 
     contact: block coordinates [N,3] of hidden surfaces; shaded: surfels in deep shade, at block
     coordinates. The sides of a support have no columns.

@@ -98,9 +98,7 @@ class GridBlock:
 
     @cached_property
     def normals(self) -> Float32:
-        """Unit normals [X,Y,Z,3], against the gradient of the smoothed opacity; 0 where the gradient
-        vanishes.
-        """
+        """Unit normals [X,Y,Z,3], against the gradient of the smoothed opacity; 0 without a gradient."""
         if min(self.shape) < 3:
             return np.zeros((*self.shape, 3), np.float32)
         smooth = ndimage.gaussian_filter(1.0 - np.exp(-self.depth), 1.2)
@@ -156,8 +154,10 @@ class GridBlock:
         )
 
     def crop_to_changes(self, mask: Mask, region: Cage) -> tuple[Cage, GridBlock]:
-        """(cage around the cells of the vertices of a mask [X,Y,Z], or `region`; the block cropped to that
-        cage).
+        """(cage around the cells of the vertices of a mask [X,Y,Z], block cropped to that cage).
+
+        `region` and the whole block without any such vertex, or outside the uniform part of an unbounded
+        field.
         """
         vertices, field = np.argwhere(mask), self.field
         if not len(vertices):
@@ -286,9 +286,9 @@ def _extract_stored(field: VoxelField, low: NDArray[np.int64], shape: NDArray[np
     _, ny, nz = field.resolution
     rows = slice(*np.searchsorted(field.vertices, [low[0] * ny * nz, (low[0] + shape[0]) * ny * nz]))
     vertices = field.vertices[rows]
-    at = np.stack([vertices // (ny * nz), vertices // nz % ny, vertices % nz], axis=1) - low
-    inside = ((at >= 0) & (at < shape)).all(axis=1)
-    index = tuple(at[inside].T)
+    positions = np.stack([vertices // (ny * nz), vertices // nz % ny, vertices % nz], axis=1) - low
+    inside = ((positions >= 0) & (positions < shape)).all(axis=1)
+    index = tuple(positions[inside].T)
     density, slot = np.zeros(shape, np.float32), np.full(shape, -1, np.int64)
     density[index] = field.density[rows][inside]
     slot[index] = np.arange(int(inside.sum()))
@@ -298,9 +298,7 @@ def _extract_stored(field: VoxelField, low: NDArray[np.int64], shape: NDArray[np
 def _sample_changed(
     block: GridBlock, below: EditStack, rows: NDArray[np.int64], preserve_opacity: bool
 ) -> tuple[NDArray[np.int64], Float32, Float32]:
-    """(rows [M], density [M], sh [M,K,3]) of the vertices among `rows` (flat indices) that the edits
-    change.
-    """
+    """(rows [M], density [M], sh [M,K,3]) of the vertices among `rows` that the edits change."""
     points = world_positions(block.field, np.stack(np.unravel_index(rows, block.shape), axis=1) + block.low)
     in_boxes = np.zeros(len(rows), bool)
     for box in below.boxes:

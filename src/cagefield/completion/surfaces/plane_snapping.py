@@ -49,18 +49,19 @@ MAX_NEIGHBORS = 24
 """Maximum number of such neighbors."""
 
 MAX_CENTROID_OFFSET_SHARE = 0.5
-"""A surfel lies inside a plane's extent if the centroid of its neighbors is nearer than this share of
-their mean distance."""
+"""Maximum distance of a surfel inside a plane's extent from the centroid of its neighbors, as a share of
+their mean distance.
+"""
 
 
 def snap_to_planes(
     surface: Surfels, voxel: float, *, seed: int = 0, edges: bool = False
 ) -> tuple[Surfels, NDArray[np.bool_]]:
-    """(surfels [N], those on planes with their plane's position and normal; mask [N] of the surfels on
-    planes).
+    """(surfels [N], snapped to planes; mask [N] of the surfels on planes).
 
-    With `edges`, a surfel that is tilted or off its plane is moved only if inliers of the plane surround
-    it: a bump is moved, the rounded edge of a table is not. `voxel` is in world units.
+    A surfel on a plane gets the plane's normal, and its projection onto the plane. With `edges`, a surfel
+    that is tilted or off its plane is snapped only if inliers of the plane surround it: a bump is snapped,
+    the rounded edge of a table is not. `voxel` is in world units.
     """
     points, normals = surface.points.copy(), surface.normals.copy()
     unassigned = np.ones(len(points), bool)
@@ -96,22 +97,27 @@ def snap_to_planes(
 
 
 def _is_surrounded(
-    points: Array, candidate_mask: NDArray[np.bool_], sure: NDArray[np.bool_], radius: float
+    points: Array, candidate_mask: NDArray[np.bool_], is_inlier: NDArray[np.bool_], radius: float
 ) -> NDArray[np.bool_]:
-    """Mask [N] of points on a plane, among `candidate_mask` [N], that `sure` inliers [N] surround."""
+    """Mask [N] of points on a plane, among `candidate_mask` [N], that inliers [N] surround."""
     is_inside = np.zeros(len(points), bool)
     candidates = np.flatnonzero(candidate_mask)
-    if not len(candidates) or not sure.any():
+    if not len(candidates) or not is_inlier.any():
         return is_inside
-    distance, rows = cKDTree(points[sure]).query(
+    distance, rows = cKDTree(points[is_inlier]).query(
         points[candidates], k=[*range(1, MAX_NEIGHBORS + 1)], distance_upper_bound=radius, workers=-1
     )
-    near = np.isfinite(distance)
-    count = np.maximum(near.sum(axis=1), 1)
-    offset = np.where(near[..., None], points[sure][np.where(near, rows, 0)] - points[candidates, None], 0.0)
+    has_neighbor = np.isfinite(distance)
+    count = np.maximum(has_neighbor.sum(axis=1), 1)
+    offset = np.where(
+        has_neighbor[..., None],
+        points[is_inlier][np.where(has_neighbor, rows, 0)] - points[candidates, None],
+        0.0,
+    )
     centroid_distance = np.linalg.norm(offset.sum(axis=1), axis=1) / count
-    is_inside[candidates] = near[:, 0] & (
-        centroid_distance < MAX_CENTROID_OFFSET_SHARE * np.where(near, distance, 0.0).sum(axis=1) / count
+    is_inside[candidates] = has_neighbor[:, 0] & (
+        centroid_distance
+        < MAX_CENTROID_OFFSET_SHARE * np.where(has_neighbor, distance, 0.0).sum(axis=1) / count
     )
     return is_inside
 

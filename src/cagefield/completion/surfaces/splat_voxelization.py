@@ -44,10 +44,9 @@ def choose_voxel_size(splats: SplatField, box: Array) -> float:
 
 
 def voxelize_splats(splats: SplatField, box: Array, voxel: float) -> VoxelField:
-    """Voxel field of splats in a world-space box [2,3]: density, and a color that is the same in all
-    directions.
+    """Voxel field of splats in a world-space box [2,3]: density, and view-independent color.
 
-    `voxel` is the edge of a voxel, world units; the box grows to a whole number of voxels.
+    `voxel` is the edge of a voxel, world units; the box grows to a whole number of them.
     """
     count = np.maximum(np.ceil((box[1] - box[0]) / voxel).astype(np.int64), 2) + 1
     bounds = box.mean(axis=0) + 0.5 * voxel * (count - 1) * np.array([[-1.0], [1.0]])

@@ -46,104 +46,109 @@ class Support:
     axes: Array
     members: Array
 
-    def to_local(self, at: Array) -> tuple[Array, Array]:
+    def to_local(self, coordinates: Array) -> tuple[Array, Array]:
         """(u and v [N,2], height over the plane [N]) of block coordinates [N,3]."""
-        offset = at - self.point
+        offset = coordinates - self.point
         return offset @ self.axes.T, offset @ self.normal
 
 
 def find_support(
-    part: Mask, surface: Surfels, at: Array, near: NDArray[np.bool_], voxel: float
+    part: Mask, surface: Surfels, coordinates: Array, is_near: NDArray[np.bool_], voxel: float
 ) -> Support | None:
     """Support of a part [X,Y,Z] on the planes among the surfels [N] that are near the part; None without one.
 
-    at [N,3]: the surfels' block coordinates; near [N]: the candidates; voxel: world units.
+    coordinates [N,3]: block coordinates of the surfels; is_near [N]: candidates; voxel: world units.
     """
-    flat, on = snap_to_planes(surface.take(near), voxel)
-    normals, ring = surface.normals.copy(), np.zeros(len(at), bool)
-    normals[near], ring[near] = flat.normals, on
-    return fit_support(part, at, normals, ring)
+    flat, on = snap_to_planes(surface.take(is_near), voxel)
+    normals, ring = surface.normals.copy(), np.zeros(len(coordinates), bool)
+    normals[is_near], ring[is_near] = flat.normals, on
+    return fit_support(part, coordinates, normals, ring)
 
 
 def fit_support(
-    part: Mask, at: Array, normals: Array, ring: NDArray[np.bool_], *, seed: int = 0
+    part: Mask, coordinates: Array, normals: Array, ring: NDArray[np.bool_], *, seed: int = 0
 ) -> Support | None:
     """Plane through the surfels of the ring [N] that the part [X,Y,Z] stands on, or hangs just over.
 
-    at, normals [N,3]: block coordinates and normals of all surfels. RANSAC weights each surfel by its
-    distance from the part along the normal. All surfels on the plane become its members.
+    coordinates, normals [N,3]: block coordinates and normals of all surfels. RANSAC weights each surfel by
+    its distance from the part along the normal. All surfels on the plane become its members.
     """
     ring, vertices = ring.copy(), np.argwhere(part).astype(np.float64)
     for _ in range(MAX_CANDIDATE_PLANES):
         if ring.sum() < MIN_SUPPORT_SURFELS or not len(vertices):
             break
-        plane = _fit_plane(part, vertices, at[ring], normals[ring], seed)
+        plane = _fit_plane(part, vertices, coordinates[ring], normals[ring], seed)
         if plane is None:
             break
-        is_near = np.abs((at - plane[0]) @ plane[1]) < PLANE_DISTANCE_VOXELS
-        support = _build_support(*plane, at, normals)
-        if _is_wide(support.to_local(at[is_near & (normals @ plane[1] > MIN_MEMBER_COSINE)])[0]):
+        is_near = np.abs((coordinates - plane[0]) @ plane[1]) < PLANE_DISTANCE_VOXELS
+        support = _build_support(*plane, coordinates, normals)
+        if _is_wide(support.to_local(coordinates[is_near & (normals @ plane[1] > MIN_MEMBER_COSINE)])[0]):
             return support
         ring &= ~is_near
     return None
 
 
 def _fit_plane(
-    part: Mask, vertices: Array, at: Array, normals: Array, seed: int
+    part: Mask, vertices: Array, coordinates: Array, normals: Array, seed: int
 ) -> tuple[Array, Array] | None:
-    """(point [3], normal [3]) of the plane of surfels [N] under the vertices [M,3] of a part; None without
-    one.
-    """
+    """(point [3], normal [3]) of the plane of surfels [N] under the vertices [M,3] of a part, or None."""
     size = float(np.median(np.ptp(vertices, axis=0))) + 1.0
     probe = max(4.0, 0.25 * size)
     part_distance = ndimage.distance_transform_edt(~part)
-    distance = ndimage.map_coordinates(part_distance, (at + probe * normals).T, order=1, mode="nearest")
+    distance = ndimage.map_coordinates(
+        part_distance, (coordinates + probe * normals).T, order=1, mode="nearest"
+    )
     weight = np.clip(1.0 - distance / (2.0 * probe), 0.02, 1.0)
     rng = np.random.default_rng(seed)
-    sample = rng.choice(len(at), min(len(at), 6000), replace=False)
+    sample = rng.choice(len(coordinates), min(len(coordinates), 6000), replace=False)
     probes = vertices[rng.choice(len(vertices), min(len(vertices), 2000), replace=False)]
     best, best_score = None, 0.0
-    for row in rng.choice(len(at), min(PLANE_TRIALS, len(at)), replace=False, p=weight / weight.sum()):
+    for row in rng.choice(
+        len(coordinates), min(PLANE_TRIALS, len(coordinates)), replace=False, p=weight / weight.sum()
+    ):
         n = normals[row].astype(np.float64)
-        height = (at[sample] - at[row]) @ n
+        height = (coordinates[sample] - coordinates[row]) @ n
         is_inlier = (np.abs(height) < PLANE_DISTANCE_VOXELS) & (normals[sample] @ n > MIN_PLANE_COSINE)
         score = float(weight[sample][is_inlier].sum())
         if score <= best_score:
             continue
-        probe_height = (probes - at[row]) @ n
+        probe_height = (probes - coordinates[row]) @ n
         if (probe_height < -PLANE_DISTANCE_VOXELS - 1.0).mean() < 0.05 and np.percentile(
             probe_height, 3
         ) < max(4.0, 0.3 * size):
             best, best_score = row, score
     if best is None:
         return None
-    n, center = normals[best].astype(np.float64), at[best]
+    n, center = normals[best].astype(np.float64), coordinates[best]
     for _ in range(3):
         member = np.flatnonzero(
-            (np.abs((at - center) @ n) < PLANE_DISTANCE_VOXELS) & (normals @ n > MIN_PLANE_COSINE)
+            (np.abs((coordinates - center) @ n) < PLANE_DISTANCE_VOXELS) & (normals @ n > MIN_PLANE_COSINE)
         )
         if len(member) < MIN_SUPPORT_SURFELS:
             return None
-        center = at[member].mean(axis=0)
-        axis = np.linalg.eigh(np.cov((at[member] - center).T))[1][:, 0]
+        center = coordinates[member].mean(axis=0)
+        axis = np.linalg.eigh(np.cov((coordinates[member] - center).T))[1][:, 0]
         n = axis if axis @ n > 0.0 else -axis
     return center, n
 
 
-def _build_support(center: Array, n: Array, at: Array, normals: Array) -> Support:
+def _build_support(center: Array, n: Array, coordinates: Array, normals: Array) -> Support:
     """Support on the plane through `center` [3] with normal n [3], of surfels [N]."""
     aside = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
     aside /= np.linalg.norm(aside)
-    is_member = (np.abs((at - center) @ n) < 2.0 * PLANE_DISTANCE_VOXELS) & (normals @ n > MIN_MEMBER_COSINE)
+    is_member = (np.abs((coordinates - center) @ n) < 2.0 * PLANE_DISTANCE_VOXELS) & (
+        normals @ n > MIN_MEMBER_COSINE
+    )
     # Columns begin at a vertex: between two of them, half of the vertices would share a column.
     vertex = np.round(center)
     point = vertex + ((center - vertex) @ n) * n
-    return Support(point, n, np.stack([aside, np.cross(n, aside)]), at[is_member])
+    return Support(point, n, np.stack([aside, np.cross(n, aside)]), coordinates[is_member])
 
 
 def _is_wide(uv: Array) -> bool:
-    """Whether columns [N,2] contain a square of half width MIN_HALF_WIDTH_VOXELS: a plane on mere edges is a
-    strip.
+    """Whether columns [N,2] contain a square of half width MIN_HALF_WIDTH_VOXELS.
+
+    A plane that touches mere edges contains only strips.
     """
     cell = np.round(uv).astype(np.int64)
     cell -= cell.min(axis=0)

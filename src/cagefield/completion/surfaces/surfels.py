@@ -105,16 +105,20 @@ class Surfels:
         distances, behind = self.distances_and_sides(points, radius)
         return np.where(behind, 0.0, distances)
 
-    def occlusion_terms(self, at: Surfels, radii: Sequence[float]) -> Array:
+    def occlusion_terms(self, surfels: Surfels, radii: Sequence[float]) -> Array:
         """Occlusion terms max(0, 1 - D(p + r n) / r) [M,R] at surfels (p, n) [M], for increasing radii r.
 
         D is 0 behind a surface that the segment along the normal crossed. A thin object is often seen from
         one side only: a point before the unseen side is behind the seen one, without a crossing.
         """
-        is_inside, free_distance, last_radius = np.zeros(len(at.points), bool), np.zeros(len(at.points)), 0.0
-        terms = np.zeros((len(at.points), len(radii)))
+        is_inside, free_distance, last_radius = (
+            np.zeros(len(surfels.points), bool),
+            np.zeros(len(surfels.points)),
+            0.0,
+        )
+        terms = np.zeros((len(surfels.points), len(radii)))
         for k, radius in enumerate(radii):
-            distance, behind = self.distances_and_sides(at.points + radius * at.normals, radius)
+            distance, behind = self.distances_and_sides(surfels.points + radius * surfels.normals, radius)
             # The surface of the surfel itself is one segment away.
             is_inside = behind & (is_inside | (free_distance < MIN_PASSED_SHARE * (radius - last_radius)))
             free_distance, last_radius = distance, radius
@@ -122,10 +126,9 @@ class Surfels:
         return terms
 
     def nearest(self, points: Array, count: int, radius: float) -> tuple[Array, NDArray[np.int64]]:
-        """(distances [M,K], rows [M,K]) of the K nearest surfels of points [M,3] within `radius`, world
-        units.
+        """(distances [M,K], rows [M,K]) of the K nearest surfels of points [M,3].
 
-        A missing neighbor has distance inf and row N.
+        A neighbor beyond `radius`, world units, has distance inf and row N.
         """
         distances, rows = self._tree.query(
             points, k=[*range(1, count + 1)], distance_upper_bound=radius, workers=-1
@@ -138,8 +141,10 @@ class Surfels:
 
     def crop_to_block(self, block: GridBlock) -> Surfels:
         """Surfels inside a block."""
-        at = block.block_coordinates(self.points)
-        return self.take(np.asarray(((at >= 0.0) & (at <= np.array(block.shape) - 1.0)).all(axis=1)))
+        coordinates = block.block_coordinates(self.points)
+        return self.take(
+            np.asarray(((coordinates >= 0.0) & (coordinates <= np.array(block.shape) - 1.0)).all(axis=1))
+        )
 
     def transform(self, points: Array, jacobian: Array) -> Surfels:
         """Surfels at points [N,3], mapped with Jacobians J [N,3,3]; normals transform with J^-T."""
@@ -147,8 +152,9 @@ class Surfels:
         return Surfels(points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12))
 
     def downsample(self, edge: float) -> Surfels:
-        """Mean surfels of the cells of an edge, world units, one for each dominant axis and sign of the
-        normals.
+        """Mean surfels of cells of `edge`, world units.
+
+        A cell has one for each dominant axis and sign of its normals.
         """
         if not len(self.points):
             return self
@@ -237,12 +243,12 @@ def extract_surfels(block: GridBlock) -> Surfels:
     optical_depth = np.cumsum(PROBE_STEP_VOXELS * depth, axis=0)
     is_half = optical_depth >= np.minimum(HALF_OPTICAL_DEPTH, 0.5 * optical_depth[-1])
     first = np.argmax(is_half, axis=0)
-    each = np.arange(len(vertices))
+    rows = np.arange(len(vertices))
     # Optical depth grows linearly between two steps.
     missing = np.minimum(HALF_OPTICAL_DEPTH, 0.5 * optical_depth[-1]) - np.where(
-        first > 0, optical_depth[first - 1, each], 0.0
+        first > 0, optical_depth[first - 1, rows], 0.0
     )
-    share = np.clip(missing / np.maximum(PROBE_STEP_VOXELS * depth[first, each], 1e-9), 0.0, 1.0)
+    share = np.clip(missing / np.maximum(PROBE_STEP_VOXELS * depth[first, rows], 1e-9), 0.0, 1.0)
     g = vertices + (steps[first] - PROBE_STEP_VOXELS * (share - 0.5))[:, None] * direction
     middle = 0.5 * (block.stride - 1)
     points = world_positions(block.field, block.stride * g + block.low + middle)
@@ -267,9 +273,7 @@ def extract_cut_faces(block: GridBlock, cage: Cage) -> Surfels:
 
 
 def _smooth_normals(points: Array, normals: Array, radius: float) -> Array:
-    """Unit normals [N,3] averaged over the points [N,3] nearby that face similarly; `radius` in world
-    units.
-    """
+    """Unit normals [N,3], averaged over points [N,3] within `radius` that face similarly."""
     count = min(SMOOTHING_NEIGHBORS, len(points))
     distances, rows = cKDTree(points).query(
         points, k=[*range(1, count + 1)], distance_upper_bound=radius, workers=-1
@@ -282,8 +286,9 @@ def _smooth_normals(points: Array, normals: Array, radius: float) -> Array:
 
 
 def average_normals(normals: Array, neighbors: Array, mask: Mask, min_cosine: float) -> Array:
-    """Unit normals [N,3], averages of the neighbors [N,K,3] that `mask` [N,K] has and whose cosine is
-    larger.
+    """Unit normals [N,3]: averages of the neighbors [N,K,3] in `mask` [N,K].
+
+    Neighbors below `min_cosine` do not count.
     """
     is_similar = mask & (np.einsum("nki,ni->nk", neighbors, normals) > min_cosine)
     mean = np.einsum("nki,nk->ni", neighbors, is_similar.astype(np.float64))
