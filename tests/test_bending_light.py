@@ -199,7 +199,7 @@ def test_splats_under_what_is_lifted_get_lighter():
     inner, outer = Cage.box((0.1, 0.0, 0.45), (0.62, 0.62, 0.66)), Cage.box((0.1, 0.0, 0.85), (1.3, 1.3, 1.5))
     light = relight_splats(field, EditStack(), Edit(inner, outer).translate((0.0, 0.0, 0.4)), LIGHT)
     assert isinstance(light.patch, SplatPatch)
-    log = light.patch.light.interpolate(field.means.astype(np.float64))
+    log = light.patch.light.at(field.means.astype(np.float64))
     away = np.linalg.norm(np.maximum(np.abs(field.means[:, :2] - [0.1, 0.0]) - 0.25, 0.0), axis=1)
     under, far = on_floor & (away == 0.0), on_floor & (away > 1.3 * REACH)
     assert log[under].mean() > 0.15 and np.abs(log[far]).max() < 0.05
