@@ -12,7 +12,7 @@ import pytest
 
 from cagefield.files import atomic
 from cagefield.files.atomic import recover_folder, replaced_folder
-from cagefield.files.rename_exchange import exchanged
+from cagefield.files.rename_exchange import exchange_names
 from cagefield.scene.scene import Scene
 from scenes import ball_scene, files_of
 
@@ -27,11 +27,11 @@ def test_two_names_are_exchanged(tmp_path: Path) -> None:
     for name in "ab":
         (tmp_path / name).mkdir()
         (tmp_path / name / "file").write_text(name)
-    if not exchanged(tmp_path / "a", tmp_path / "b"):
+    if not exchange_names(tmp_path / "a", tmp_path / "b"):
         pytest.skip("this system exchanges no names")
     assert (tmp_path / "a" / "file").read_text() == "b" and (tmp_path / "b" / "file").read_text() == "a"
     with pytest.raises(FileNotFoundError):
-        exchanged(tmp_path / "a", tmp_path / "missing")
+        exchange_names(tmp_path / "a", tmp_path / "missing")
 
 
 @pytest.mark.parametrize("can_exchange", [True, False])

@@ -13,10 +13,10 @@ from cagefield.edits import Edit, EditStack
 from cagefield.edits.edit_files import save_edits
 from cagefield.errors import CagefieldError, EditError
 from cagefield.exporting import (
-    DETAIL,
-    LONGEST_SIDE,
+    MAX_IMAGE_SIDE_PX,
     MOST_HELD_OUT,
     MOST_VIEWS,
+    PIXELS_PER_VOXEL,
     cages_of,
     fitting_cameras,
     inside,
@@ -194,13 +194,13 @@ def test_cameras_are_the_scenes_or_stand_around_it() -> None:
     assert (len(train), len(held_out)) == (3, 2)
     own = scene.cameras["train"][0]
     distance = np.linalg.norm(own.origin)
-    # Pixels of DETAIL voxels at the middle; more where the camera's own are finer.
+    # Pixels of PIXELS_PER_VOXEL voxels at the middle; more where the camera's own are finer.
     pixel = distance / train[0].fx
-    assert pixel == pytest.approx(DETAIL * scene.field.sample_spacing, rel=0.02)
+    assert pixel == pytest.approx(PIXELS_PER_VOXEL * scene.field.sample_spacing, rel=0.02)
     assert train[0].width / train[0].height == pytest.approx(own.width / own.height, rel=0.02)
     fine = dataclasses.replace(scene, cameras={"train": tuple(c.resized(1200, 800) for c in train)})
     train, held_out = fitting_cameras(fine)
-    assert max(train[0].width, train[0].height) == LONGEST_SIDE and (len(train), len(held_out)) == (3, 1)
+    assert max(train[0].width, train[0].height) == MAX_IMAGE_SIDE_PX and (len(train), len(held_out)) == (3, 1)
     train, held_out = fitting_cameras(dataclasses.replace(scene, cameras={}))
     assert len(train) + len(held_out) == 48 and not {*train} & {*held_out}
     many = dataclasses.replace(scene, cameras={"train": own_ring(own, 500), "test": own_ring(own, 90)})

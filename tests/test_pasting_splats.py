@@ -13,7 +13,7 @@ from cagefield.completion.splat_patch import build_splat_patch
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.operations import Rotate
 from cagefield.errors import EditError
-from cagefield.exporting import baked
+from cagefield.exporting import edited_splats
 from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats.splat_files import write_splats
 from cagefield.geometry.cage import Cage
@@ -104,7 +104,7 @@ def test_what_is_made_is_the_oracles(folder: Path) -> None:
 def test_a_paste_hides_nothing_and_its_cage_cuts(folder: Path) -> None:
     heap, ball = Scene.open(folder / "heap").field, Scene.open(folder / "ball").field
     assert isinstance(heap, SplatField) and isinstance(ball, SplatField)
-    shown = baked(with_heap(folder, Edit.paste("../heap", Cage.box((0.0, 0.0, 0.0), 0.8))))
+    shown = edited_splats(with_heap(folder, Edit.paste("../heap", Cage.box((0.0, 0.0, 0.0), 0.8))))
     reds = np.isclose(shown.sh[:, 0, 0], ball.sh[0, 0, 0], atol=1e-6)
     assert reds.sum() == len(ball)
     came = shown.means[~reds]

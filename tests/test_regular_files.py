@@ -14,7 +14,7 @@ import pytest
 
 from cagefield.errors import CagefieldError, DatasetError, SceneError
 from cagefield.files.npz import DEFLATED, read_array, read_arrays
-from cagefield.files.safe_open import MOST_TEXT, UnreadableError, check_regular, open_regular, read_text
+from cagefield.files.safe_open import MAX_TEXT_BYTES, UnreadableError, check_regular, open_regular, read_text
 from cagefield.scene.scene import Scene
 from cagefield.server.editor.pasted_sources import sources_under
 from cagefield.server.editor.persistence import SceneStore
@@ -90,7 +90,7 @@ def test_what_takes_the_place_of_a_file_meanwhile_is_no_file(
 
 
 def test_a_file_that_grows_is_read_no_further(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "a").write_bytes(bytes(MOST_TEXT + 1))
+    (tmp_path / "a").write_bytes(bytes(MAX_TEXT_BYTES + 1))
     monkeypatch.setattr("cagefield.files.safe_open.check_regular", lambda *_: 0)
     with pytest.raises(UnreadableError, match="at most"):
         read_text(tmp_path / "a")

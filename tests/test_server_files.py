@@ -20,7 +20,7 @@ from cagefield.errors import CagefieldError, SceneError
 from cagefield.formats.splats.splat_files import read_splats, write_splats
 from cagefield.scene.scene import Scene
 from cagefield.server.editor.persistence import SceneStore, stem_of
-from cagefield.server.render_worker.subprocess_task import in_own_process
+from cagefield.server.render_worker.subprocess_task import run_in_process
 from cagefield.server.web import splat_file_scene, uploads
 from cagefield.server.web.app import application
 from cagefield.server.web.launch import open_scene
@@ -298,7 +298,7 @@ def test_a_page_that_hangs_up_amid_a_file_is_no_error(
 def test_a_file_that_is_too_large_is_refused_by_what_it_says_and_by_what_comes(
     scene: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(uploads, "MOST_UPLOAD", 1000)
+    monkeypatch.setattr(uploads, "MAX_UPLOAD_BYTES", 1000)
     answer = asyncio.run(posted(scene, "a.ply", b"x" * 1001))
     assert answer.status_code == 413 and "open it with `cagefield view FILE`" in answer.text
     editor = uploads.OpenEditor(*open_scene(scene), lambda scene, source: open_scene(scene))
@@ -393,8 +393,8 @@ def test_voxels_have_no_splats_to_download(tmp_path: Path) -> None:
 
 
 def test_work_in_its_own_process_returns_raises_and_is_lost_in_one_line() -> None:
-    assert asyncio.run(in_own_process(len, "abc")) == 3
+    assert asyncio.run(run_in_process(len, "abc")) == 3
     with pytest.raises(CagefieldError, match="that failed: ZeroDivisionError"):
-        asyncio.run(in_own_process(divmod, 1, 0))
+        asyncio.run(run_in_process(divmod, 1, 0))
     with pytest.raises(CagefieldError, match="the process that did this ended"):
-        asyncio.run(in_own_process(os._exit, 3))
+        asyncio.run(run_in_process(os._exit, 3))

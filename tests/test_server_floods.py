@@ -19,7 +19,7 @@ from cagefield.server.editor.session import Session
 from cagefield.server.protocol.conversion import state_of
 from cagefield.server.web import websocket
 from cagefield.server.web.security import Allowance
-from cagefield.server.web.worker_threads import in_thread
+from cagefield.server.web.worker_threads import run_in_thread
 from scenes import ball_scene
 
 EDIT = {
@@ -41,10 +41,10 @@ def test_work_in_a_thread_returns_raises_and_is_waited_for() -> None:
         return "done"
 
     async def check() -> None:
-        assert await in_thread(lambda: 3) == 3
+        assert await run_in_thread(lambda: 3) == 3
         with pytest.raises(EditFileError):
-            await in_thread(lambda: parse_edits("edits: 1"))
-        waiting = asyncio.ensure_future(in_thread(work))
+            await run_in_thread(lambda: parse_edits("edits: 1"))
+        waiting = asyncio.ensure_future(run_in_thread(work))
         await asyncio.to_thread(began.wait, 60)
         waiting.cancel()
         await asyncio.sleep(0.05)

@@ -20,7 +20,7 @@ from cagefield.server.render_worker import page_files, renderer_cache, unused_me
 from cagefield.server.render_worker.renderer_cache import KEPT_EDITS, RendererCache
 from cagefield.server.render_worker.tasks import PageEditsTask, Shown, values_of
 from cagefield.server.render_worker.unused_memory import UnusedMemory
-from cagefield.server.web.worker_threads import all_started, in_thread
+from cagefield.server.web.worker_threads import run_in_thread, start_all_threads
 from scenes import ball_scene
 
 INNER = Cage.box((0, 0, 0), 1.2)
@@ -85,7 +85,7 @@ def test_edits_that_are_not_kept_are_nowhere(
 def test_memory_between_blocks_in_use_is_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
     if UnusedMemory()._trim is None:
         pytest.skip("this C library has no malloc_trim")
-    monkeypatch.setattr(unused_memory, "EVERY", 0.0)
+    monkeypatch.setattr(unused_memory, "RETURN_INTERVAL_SECONDS", 0.0)
     blocks = [np.ones(2500) for _ in range(5000)]  # of 20 kB: none has a mapping of its own
     del blocks[:-1]
     before = _resident()
@@ -99,11 +99,11 @@ def test_it_is_not_given_back_all_the_time() -> None:
 
 def test_it_is_given_back_again_and_again(monkeypatch: pytest.MonkeyPatch) -> None:
     times = []
-    monkeypatch.setattr(unused_memory, "EVERY", 0.01)
+    monkeypatch.setattr(unused_memory, "RETURN_INTERVAL_SECONDS", 0.01)
     monkeypatch.setattr(UnusedMemory, "give_back", lambda self: times.append(self))
 
     async def a_while() -> None:
-        giving = asyncio.create_task(unused_memory.giving_back())
+        giving = asyncio.create_task(unused_memory.return_memory_periodically())
         while len(times) < 3:
             await asyncio.sleep(0.01)
         giving.cancel()
@@ -116,9 +116,9 @@ def test_no_thread_begins_after_the_start() -> None:
     """Each keeps memory of its own, and one more would be there for ever."""
 
     async def much() -> int:
-        asyncio.get_running_loop().set_default_executor(all_started(3))
+        asyncio.get_running_loop().set_default_executor(start_all_threads(3))
         before = threading.active_count()
-        await asyncio.gather(*(in_thread(lambda: time.sleep(0.02)) for _ in range(20)))
+        await asyncio.gather(*(run_in_thread(lambda: time.sleep(0.02)) for _ in range(20)))
         return threading.active_count() - before
 
     before = threading.active_count()
@@ -138,6 +138,6 @@ def test_where_the_system_has_no_more_threads_those_that_there_are_work(
         start(thread)
 
     monkeypatch.setattr(threading.Thread, "start", limited)
-    with all_started(5) as executor:
+    with start_all_threads(5) as executor:
         assert sum(each.is_alive() for each in begun) == 2
         assert [executor.submit(pow, 2, each).result(30.0) for each in range(4)] == [1, 2, 4, 8]

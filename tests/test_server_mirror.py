@@ -8,7 +8,7 @@ import pytest
 from cagefield.edits import Edit
 from cagefield.edits import operations as ops
 from cagefield.geometry.cage import Cage
-from cagefield.server.editor.mirror import mirrored, mirrored_cage
+from cagefield.server.editor.mirror import mirror_edit, mirrored_cage
 
 INNER = Cage.box((0.2, 0.1, -0.1), (0.5, 0.4, 0.3), (0.3, -0.2, 0.5))
 OPERATIONS: tuple[ops.Operation, ...] = (
@@ -37,7 +37,7 @@ def reflected(points: np.ndarray, axis: int, at: float) -> np.ndarray:
 )
 def test_every_operation_is_the_mirror_image_of_itself(axis: int, operation: ops.Operation) -> None:
     edit = Edit(INNER, adjustment="discrete").then(operation)
-    other = mirrored(edit, axis, 0.3)
+    other = mirror_edit(edit, axis, 0.3)
     rng = np.random.default_rng(0)
     points = INNER.corners.mean(axis=0) + rng.uniform(-0.3, 0.3, (200, 3))
     there = reflected(edit.exact_warp.to_canonical(points).points, axis, 0.3)

@@ -99,7 +99,7 @@ def test_a_damaged_autosave_is_passed_over(path: Path, text: str) -> None:
 
 def test_damaged_autosaves_are_kept_beside_one_another(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Up to a few, of which the first stay."""
-    monkeypatch.setattr(persistence, "MOST_DAMAGED", 3)
+    monkeypatch.setattr(persistence, "MAX_DAMAGED_AUTOSAVES", 3)
     store, _ = opened(path)
     ends = (".damaged$", ".damaged-2$", ".damaged-3$", ".damaged-3 in place of an older one$")
     for number, end in enumerate(ends):

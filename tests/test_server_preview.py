@@ -16,7 +16,7 @@ from cagefield.edits import Edit, EditStack, Translate, dump_edits
 from cagefield.errors import CagefieldError, CameraError, EditError
 from cagefield.geometry.cage import Cage
 from cagefield.server.editor.document import Document
-from cagefield.server.editor.path_edits import blended
+from cagefield.server.editor.path_edits import edits_at_time
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import client_messages, common
 from cagefield.server.protocol.conversion import MOST_STILLS, STILLS_PER_SECOND, stills_of
@@ -60,7 +60,7 @@ def test_the_preview_shows_the_edits_of_the_videos_pictures(loop: bool) -> None:
     fps = 16.0
     for n, still in enumerate(stills(keys, loop=loop, fps=fps, width=8, height=8)):
         s.play(1, 1, n / fps)
-        expected = blended(s.document, still.parts)
+        expected = edits_at_time(s.document, still.parts)
         assert len(s.drawn()) == len(expected)
         for found, edit in zip(s.drawn(), expected, strict=True):
             np.testing.assert_allclose(found.deformed.corners, edit.deformed.corners, atol=1e-12)
@@ -160,7 +160,7 @@ def test_where_an_edit_is_not_possible_the_preview_stops_with_the_jobs_line() ->
         s.play(1, 1, 1.0)
     assert s.preview is None and s.drawn() == (TURNED,)
     with pytest.raises(CagefieldError) as job:
-        blended(s.document, {1: 0.5})
+        edits_at_time(s.document, {1: 0.5})
     assert str(at.value) == str(job.value)
 
 
@@ -239,7 +239,7 @@ def test_all_pages_show_the_preview_and_are_told_of_its_beginning_and_its_end(pl
     assert played.previews() == [[(1, 4, True)]] * 2
     played.say(0, "play", play=4, seconds=1.0)
     assert played.previews() == [[], []]
-    expected = Shown(values_of(blended(coordinator.session.document, {1: 0.5})))
+    expected = Shown(values_of(edits_at_time(coordinator.session.document, {1: 0.5})))
     assert coordinator.shown() != Shown(values_of((ARM, STILL)))
     np.testing.assert_allclose(
         [e["operations"][0].by for e in coordinator.shown().edits],

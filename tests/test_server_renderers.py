@@ -18,9 +18,9 @@ from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError, EditError
 from cagefield.geometry.cage import Cage
 from cagefield.images.image_files import write_video
-from cagefield.server.editor.cage_placement import PROBES, fitted, probes
+from cagefield.server.editor.cage_placement import PROBES_PER_AXIS, fit_to_content, probes
 from cagefield.server.editor.document import Document
-from cagefield.server.editor.path_edits import blended
+from cagefield.server.editor.path_edits import edits_at_time
 from cagefield.server.render_queue import jobs
 from cagefield.server.render_queue.background import BackgroundWork
 from cagefield.server.render_worker.grid_lines import grid_lines
@@ -210,7 +210,7 @@ def test_a_cage_is_fitted_to_what_the_edits_below_left_in_it(renderers: Renderer
     handlers = TaskHandlers(renderers)
     cage = Cage.box((0, 0, 0), 1.9)
     low, high = (
-        fitted(cage, np.array(found.value)).aabb
+        fit_to_content(cage, np.array(found.value)).aabb
         for found in (
             handlers.do(FitTask(1, Shown(values_of(edits)), cage), lambda _: False)
             for edits in ((), (MOVED,))
@@ -221,7 +221,7 @@ def test_a_cage_is_fitted_to_what_the_edits_below_left_in_it(renderers: Renderer
     np.testing.assert_allclose(low, [[-0.6] * 3, [0.6] * 3], atol=0.08)
     np.testing.assert_allclose(high[:, 0], low[:, 0] + 0.25, atol=0.08)
     with pytest.raises(EditError, match="nothing dense inside"):
-        fitted(cage, np.zeros(PROBES**3, bool))
+        fit_to_content(cage, np.zeros(PROBES_PER_AXIS**3, bool))
 
 
 def test_specks_do_not_count_when_a_cage_is_fitted() -> None:
@@ -230,7 +230,7 @@ def test_specks_do_not_count_when_a_cage_is_fitted() -> None:
     dense = np.linalg.norm(points, axis=1) < 0.5
     dense[0] = True
     expected = Cage.box((0, 0, 0), 1.0, (0.0, 0.0, 0.4))
-    np.testing.assert_allclose(fitted(cage, dense).corners, expected.corners, atol=0.13)
+    np.testing.assert_allclose(fit_to_content(cage, dense).corners, expected.corners, atol=0.13)
 
 
 def test_the_grid_bends_with_the_edit() -> None:
@@ -309,11 +309,11 @@ KEYS = tuple(
 def test_edits_are_blended_along_a_path() -> None:
     gone = Edit.delete(Cage.box((0.5, 0, 0), 0.1))
     document = Document.of([MOVED, gone, MOVED.replace(enabled=False)], keys=KEYS)
-    assert blended(document, {1: 0.0, 2: 0.0}) == ()
-    half = blended(document, {1: 0.5, 2: 0.5})
+    assert edits_at_time(document, {1: 0.0, 2: 0.0}) == ()
+    half = edits_at_time(document, {1: 0.5, 2: 0.5})
     np.testing.assert_allclose(half[0].deformed.pivot, (0.125, 0, 0))
     assert half[1] == gone
-    assert blended(document, {}) == (MOVED, gone)
+    assert edits_at_time(document, {}) == (MOVED, gone)
 
 
 def test_jobs_refuse_what_they_could_not_write(tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ from cagefield.server.protocol.common import DrawnHere
 from cagefield.server.render_queue.damage import Differing, everywhere
 from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_queue.scheduler import (
+    MAX_TILES,
     MOST_MOVING,
-    MOST_TILES,
     MOVING_SECONDS,
     SETTLE_SECONDS,
     Scheduler,
@@ -95,7 +95,7 @@ def test_a_new_page_gets_a_quick_picture_and_then_the_whole_one_in_tiles() -> No
     tiles = b.finish()
     assert all(tile.region.full_width == SIDE and not tile.moving and tile.exact for tile in tiles)
     assert [tile.final for tile in tiles] == [False] * (len(tiles) - 1) + [True]
-    assert 1 < len(tiles) <= MOST_TILES
+    assert 1 < len(tiles) <= MAX_TILES
     covered = pixels(tiles)
     assert len(covered) == SIDE * SIDE == len(set(covered))
     assert b.scheduler.idle()

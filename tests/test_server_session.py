@@ -14,7 +14,7 @@ from cagefield.geometry.cage import Cage
 from cagefield.server.editor import validity
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.drag_solver import Target, move_corners
-from cagefield.server.editor.history import LONGEST, History
+from cagefield.server.editor.history import MAX_ENTRIES, History
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol.conversion import edit_state
 
@@ -133,7 +133,7 @@ def test_in_set_mode_the_outer_cage_stops_at_the_inner_one() -> None:
 @pytest.mark.parametrize(
     ("edit", "target", "operation", "why"),
     [
-        (ARM, "field", Translate((2.0, 0, 0)), validity.OUTSIDE),
+        (ARM, "field", Translate((2.0, 0, 0)), validity.OUTSIDE_MESSAGE),
         (ARM.replace(shell="trilinear"), "field", Rotate((0, 0, 80)), validity.FOLDED),
         (ARM, "field", Translate((0.299999, 0, 0)), validity.CLOSE),
         (ARM, "field", MoveCorner(0, (2.0, 2.0, 2.0)), validity.INSIDE_OUT),
@@ -251,11 +251,11 @@ def test_history_never_leaves_its_ends() -> None:
 
 def test_a_long_history_keeps_its_beginning_and_the_newest() -> None:
     history = History.begin(0)
-    for number in range(1, LONGEST + 20):
+    for number in range(1, MAX_ENTRIES + 20):
         history = history.push(str(number), number)
-        assert history.state == number and len(history.names) == len(history.states) <= LONGEST
-    assert history.states == (0, *range(21, LONGEST + 20)) and history.names[:2] == ("Open", "21")
-    assert history.undo().push("other", -1).states[-2:] == (LONGEST + 18, -1)
+        assert history.state == number and len(history.names) == len(history.states) <= MAX_ENTRIES
+    assert history.states == (0, *range(21, MAX_ENTRIES + 20)) and history.names[:2] == ("Open", "21")
+    assert history.undo().push("other", -1).states[-2:] == (MAX_ENTRIES + 18, -1)
     assert history.go_to(0).state == 0
 
 

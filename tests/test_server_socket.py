@@ -24,7 +24,7 @@ from websockets.sync.client import connect
 
 from cagefield.edits import load_edits
 from cagefield.errors import CagefieldError
-from cagefield.server.protocol.common import MOST_BYTES
+from cagefield.server.protocol.common import MAX_MESSAGE_BYTES
 from cagefield.server.render_queue.coordinator import Page
 from cagefield.server.web.websocket import errors_reported_to
 from editor_server import PATIENCE, EditorServer, PageClient, editor_server, page
@@ -216,7 +216,7 @@ def test_malformed_messages_get_a_clear_error_and_harm_nothing(server: EditorSer
 def test_a_message_that_is_too_big_ends_its_socket_and_no_other(server: EditorServer) -> None:
     with page(server) as (other, _):
         with page(server) as (client, _):
-            client.socket.send(json.dumps({"type": "load_edits", "text": "x" * MOST_BYTES}))
+            client.socket.send(json.dumps({"type": "load_edits", "text": "x" * MAX_MESSAGE_BYTES}))
             with pytest.raises(ConnectionClosed) as closed:
                 client.until(lambda m: False, 20.0)
             assert closed.value.rcvd is not None and closed.value.rcvd.code == 1009

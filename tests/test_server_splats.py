@@ -19,14 +19,14 @@ from cagefield.geometry.cage import Cage
 from cagefield.images.metrics import psnr
 from cagefield.rendering.splats.raster_splats import DeformedSplats
 from cagefield.scene.scene import Scene
-from cagefield.server.editor.cage_placement import fitted
+from cagefield.server.editor.cage_placement import fit_to_content
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.render_queue.scheduler import Scheduler
-from cagefield.server.render_queue.splat_extent import spread
+from cagefield.server.render_queue.splat_extent import splat_extent
 from cagefield.server.render_worker.renderer_cache import RendererCache
-from cagefield.server.render_worker.splat_density import dense
+from cagefield.server.render_worker.splat_density import dense_cells
 from cagefield.server.render_worker.task_handlers import TaskHandlers
 from cagefield.server.render_worker.tasks import (
     Answered,
@@ -127,7 +127,7 @@ def test_a_cage_is_fitted_to_the_splats_in_it(renderers: RendererCache) -> None:
     def fit(cage: Cage, *edits: Edit) -> Cage:
         done = handlers.do(FitTask(1, Shown(values_of(edits)), cage), lambda _: False)
         assert isinstance(done, Answered)
-        return fitted(cage, np.array(done.value))
+        return fit_to_content(cage, np.array(done.value))
 
     low, high = fit(Cage.box((0.1, 0, 0), 1.9)).aabb
     # The ball's box, half a probe more and what the splats on it are wide.
@@ -155,14 +155,14 @@ def splats(*ones: tuple[tuple[float, float, float], tuple[float, float, float], 
 def test_fog_is_not_dense_and_many_faint_splats_are() -> None:
     cage = Cage.box((0.5, 0.5, 0.5), 1.0)
     fog = ((0.5, 0.5, 0.5), (0.1, 0.1, 0.01), 0.1)
-    assert not dense(cage, splats(fog)).any()
-    assert dense(cage, splats(*[fog] * 5)).any()
-    disc = dense(cage, splats(((0.5, 0.5, 0.5125), (0.06, 0.03, 0.001), 0.9))).reshape(40, 40, 40)
+    assert not dense_cells(cage, splats(fog)).any()
+    assert dense_cells(cage, splats(*[fog] * 5)).any()
+    disc = dense_cells(cage, splats(((0.5, 0.5, 0.5125), (0.06, 0.03, 0.001), 0.9))).reshape(40, 40, 40)
     z, y, x = np.nonzero(disc)
     assert np.array_equal(np.unique(z), [20])
     # One and a half standard deviations, where .29 of the opacity is left: a bit less than .3 of it.
     assert np.ptp(x) * 0.025 == pytest.approx(2 * 1.0 * 0.06, abs=0.06) and np.ptp(x) > 1.5 * np.ptp(y)
-    assert not dense(cage, splats(((5.0, 0.5, 0.5), (0.1, 0.1, 0.1), 1.0))).any()
+    assert not dense_cells(cage, splats(((5.0, 0.5, 0.5), (0.1, 0.1, 0.1), 1.0))).any()
 
 
 def test_lattices_have_no_error_and_warming_up_is_possible(renderers: RendererCache) -> None:
@@ -210,11 +210,11 @@ def test_what_differs_is_as_much_larger_as_splats_reach(folder: Path) -> None:
     coordinator = Coordinator(
         Session(store.document(), scene.field.bounds, scene.field.sample_spacing), store
     )
-    reach = spread(scene.field)
+    reach = splat_extent(scene.field)
     size = 2.5 * 0.5 / np.sqrt(600)  # of the ball's discs
     assert reach == pytest.approx(3.0 * size, rel=1e-3)
     assert coordinator.spread == reach and coordinator.dispatcher.scheduler.whole_at_rest
-    assert spread(scene.field.take(np.zeros(0, int))) == 0.0
+    assert splat_extent(scene.field.take(np.zeros(0, int))) == 0.0
 
 
 def test_all_of_a_picture_is_drawn_anew_at_rest() -> None:

@@ -17,7 +17,7 @@ import pytest
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from cagefield.server.web.launch import open_scene
-from cagefield.server.web.websocket import attend
+from cagefield.server.web.websocket import serve_page
 from editor_server import PATIENCE, EditorServer, editor_server, page
 from scenes import ball_scene
 
@@ -160,7 +160,7 @@ def test_a_page_that_is_gone_is_no_error(
 ) -> None:
     ball_scene().save(tmp_path / "ball")
     coordinator, hello = open_scene(tmp_path / "ball")
-    asyncio.run(asyncio.wait_for(attend(played_socket(receiving, sending), coordinator, hello), PATIENCE))
+    asyncio.run(asyncio.wait_for(serve_page(played_socket(receiving, sending), coordinator, hello), PATIENCE))
     assert coordinator.pages == {} and caplog.text == ""
 
 
@@ -171,5 +171,5 @@ def test_an_error_that_no_lost_page_explains_is_logged_and_the_page_leaves(
     ball_scene().save(tmp_path / "ball")
     coordinator, hello = open_scene(tmp_path / "ball")
     with caplog.at_level(logging.ERROR):
-        asyncio.run(asyncio.wait_for(attend(played_socket(None, error), coordinator, hello), PATIENCE))
+        asyncio.run(asyncio.wait_for(serve_page(played_socket(None, error), coordinator, hello), PATIENCE))
     assert coordinator.pages == {} and "a page's socket failed" in caplog.text and "broken" in caplog.text

@@ -13,7 +13,7 @@ from kill_checks import Check
 from kill_points import Say
 
 from cagefield import Scene
-from cagefield.files.stale_files import put_aside
+from cagefield.files.stale_files import displaced_folders
 from scenes import ball_scene
 from splat_scenes import ball_of_splats
 
@@ -80,7 +80,7 @@ def renamed(command: Command, target: str | None = None) -> Command:
 
     def problem(folder: Path, said: int) -> str | None:
         if target is not None and said < 1 and not (folder / target).exists():
-            return None if put_aside(folder / target) else "lost: the folder"
+            return None if displaced_folders(folder / target) else "lost: the folder"
         return command.check(folder, said)
 
     return replace(command, work=work, check=problem)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cagefield.edits import EditStack, Translate, load_edits, parse_edits
-from cagefield.server.editor.history import LONGEST
+from cagefield.server.editor.history import MAX_ENTRIES
 from editor_server import EditorServer, PageClient, editor_server, page
 from scenes import ball_scene, files_of
 
@@ -162,14 +162,14 @@ def test_a_page_that_was_away_for_an_hour(server: EditorServer, scene: Path) -> 
         away.socket.close()
         there.state(lambda state: abs(middle(state, ball)[0]) < 1e-5)  # the drag went with its page
         there.send("command", name="remove", edit=ball)
-        for n in range(LONGEST + 20):
+        for n in range(MAX_ENTRIES + 20):
             there.send("change", edit=other, name=f"hour {n}")
             if n % 20 == 0:
                 settled(there)
         there.send("command", name="save")
         there.until(lambda m: m["type"] == "notice" and "saved to" in m["text"])
         now = settled(there)
-        assert len(now["history"]) <= LONGEST + 1
+        assert len(now["history"]) <= MAX_ENTRIES + 1
         with page(server) as (back, hello):
             assert back.joined["edits"] == now["edits"] and back.joined["history"] == now["history"]
             back.look_from(hello)
@@ -192,5 +192,5 @@ def test_a_page_that_was_away_for_an_hour(server: EditorServer, scene: Path) -> 
             assert settled(back)["edits"] == settled(there)["edits"]
             assert len(errors(back)) == len(stale) and errors(there) == []
     (edit,) = edits_of(server)
-    assert edit.name == f"hour {LONGEST + 19}" and edit.operations == (Translate((0, 0.1, 0)),)
+    assert edit.name == f"hour {MAX_ENTRIES + 19}" and edit.operations == (Translate((0, 0.1, 0)),)
     assert load_edits(scene / "edits.yaml")[0].operations == ()

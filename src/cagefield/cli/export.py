@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 What = Literal["splats", "mesh", "points", "page"]
 
-LARGE = 25e6
+LARGE_PAGE_BYTES = 25e6
 """Bytes of a page from which on a line warns."""
 
 
@@ -140,10 +140,10 @@ class Export:
         shown = f"{edits} edit{'s' * (edits != 1)}, " if edits else "no edits, "
         way = f"a camera path of {len(keys)} keys" if len(keys) > 1 else "no camera path"
         print(f"a page of {size / 1e6:.1f} MB: {shown}{way}")
-        if size > LARGE:
+        if size > LARGE_PAGE_BYTES:
             warnings.warn(
-                f"the page has {size / 1e6:.0f} MB, more than the {LARGE / 1e6:.0f} that most sites and "
-                "phones take well; a smaller field, or fewer splats, make a smaller one",
+                f"the page has {size / 1e6:.0f} MB, more than the {LARGE_PAGE_BYTES / 1e6:.0f} that most sites "
+                "and phones take well; a smaller field, or fewer splats, make a smaller one",
                 stacklevel=2,
             )
         if page.along is not None:
@@ -179,14 +179,17 @@ class Export:
 
     def _splats(self, scene: Scene, cages: tuple[Cage, ...]) -> str:
         """Writes splats; a line of figures."""
-        from cagefield.exporting import baked, inside, upright
+        from cagefield.exporting import edited_splats, inside, upright
         from cagefield.exporting.source_coordinates import splats_in_source, world_to_source
         from cagefield.fields.splat_field import SplatField
         from cagefield.formats.splats.splat_files import write_splats
         from cagefield.scene.import_splats import axis_of, nearest_up
 
         if isinstance(scene.field, SplatField):
-            splats, figures = baked(scene), "edits baked in" if scene.edits.active else "without edits"
+            splats, figures = (
+                edited_splats(scene),
+                ("edits baked in" if scene.edits.active else "without edits"),
+            )
         else:
             splats, figures = self._fitted(scene)
         if cages:
@@ -244,12 +247,12 @@ class Export:
 
     def _points(self, scene: Scene, cages: tuple[Cage, ...]) -> str:
         """Writes points; a line of figures."""
-        from cagefield.exporting import MOST_SPLATS, inside, scene_points
+        from cagefield.exporting import MAX_FITTED_SPLATS, inside, scene_points
         from cagefield.exporting.source_coordinates import points_in_source, world_to_source
         from cagefield.formats.mesh_files import write_points
 
         with stages() as move:
-            points = scene_points(scene, self.splats or MOST_SPLATS, move)
+            points = scene_points(scene, self.splats or MAX_FITTED_SPLATS, move)
         if cages:
             import numpy as np
 

@@ -38,7 +38,7 @@ FieldKind = Literal["auto", "splat", "voxel", "nerf"]
 Preset = Literal["auto", "paper", "small"]
 Ndc = Literal["auto", "on", "off"]
 
-FOG = (
+VOXEL_FOG_WARNING = (
     "voxels explain what has no texture in a capture (walls, floors, tables) by fog in front of the cameras; "
     "--field splat is made for it"
 )
@@ -109,7 +109,7 @@ class Train:
             figures, finished = summary(splats), splats.finished
         else:
             if dataset.unbounded:
-                warnings.warn(FOG, stacklevel=2)
+                warnings.warn(VOXEL_FOG_WARNING, stacklevel=2)
             scene, voxels = train_scene(dataset, self.training.config(), checkpoint, resume=self.resume)
             figures, finished = summary(voxels), voxels.finished
         with self._kept(checkpoint, finished):

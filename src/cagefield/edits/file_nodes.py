@@ -13,7 +13,7 @@ import yaml
 
 from cagefield.errors import EditFileError
 from cagefield.files import json_text, yaml_text
-from cagefield.files.yaml_text import DEEPEST, MOST_VALUES
+from cagefield.files.yaml_text import MAX_NESTING, MAX_VALUES
 
 _LONGEST_PATH = 120
 """Characters of a key path in a message."""
@@ -177,7 +177,7 @@ def read_json(text: str, source: str) -> Node:
         raise
     except ValueError as error:  # nested too deeply, a number of thousands of digits
         raise Node(None, source, 0, "").error(f"cannot be read: {error}") from None
-    return _from_json(value, source, "", 0, [MOST_VALUES])
+    return _from_json(value, source, "", 0, [MAX_VALUES])
 
 
 def write_yaml(content: Any) -> str:
@@ -245,8 +245,8 @@ def _scalar(node: yaml.Node, place: Node) -> Any:
 def _from_json(value: Any, source: str, path: str, depth: int, budget: list[int]) -> Node:
     budget[0] -= 1
     if budget[0] < 0:
-        raise Node(None, source, 0, path).error(f"more than {MOST_VALUES} values")
-    if depth > DEEPEST:
+        raise Node(None, source, 0, path).error(f"more than {MAX_VALUES} values")
+    if depth > MAX_NESTING:
         raise Node(None, source, 0, path).error("nested too deeply")
     if isinstance(value, dict):
         children = {

@@ -33,16 +33,16 @@ if TYPE_CHECKING:
     from cagefield.training.result import TrainResult
     from cagefield.training.splats.fit_splats import SurfacePoints
 
-MOST_SPLATS = 300_000
+MAX_FITTED_SPLATS = 300_000
 """Splats that are fitted at most, unless more are asked for."""
 
-DETAIL = 0.5
+PIXELS_PER_VOXEL = 0.5
 """Pixels of the pictures that splats are fitted to, in voxels at the middle of the field; see `side_of`."""
 
-LONGEST_SIDE = 800
+MAX_IMAGE_SIDE_PX = 800
 MOST_VIEWS, MOST_HELD_OUT = 120, 20
 
-RINGS = ((-15.0, 12), (15.0, 16), (40.0, 12), (65.0, 8))
+FITTING_RINGS = ((-15.0, 12), (15.0, 16), (40.0, 12), (65.0, 8))
 """Elevation, degrees, and number of cameras around a scene that has none, or whose edits reach beyond it."""
 
 FOV_X = math.radians(45.0)
@@ -50,7 +50,7 @@ OnStage = Callable[[str, float, str], None]
 Cameras = tuple[tuple[Camera, ...], tuple[Camera, ...]]
 
 
-def baked(scene: Scene) -> SplatField:
+def edited_splats(scene: Scene) -> SplatField:
     """The splats of a scene of splats as its edits make them. Raises EditError for an edit that cannot be."""
     if not isinstance(scene.field, SplatField):
         raise CagefieldError("the scene holds voxels, no splats; fit splats to it")
@@ -68,7 +68,7 @@ def fitted_splats(
     from cagefield.training.splats.splat_run import max_splats
 
     cameras, held_out = fitting_cameras(scene)
-    config = replace(config, splats=config.splats or min(MOST_SPLATS, max_splats(cameras, config)))
+    config = replace(config, splats=config.splats or min(MAX_FITTED_SPLATS, max_splats(cameras, config)))
     return fit_splats(
         scene.renderer,
         cameras,
@@ -148,7 +148,7 @@ def scene_mesh(
         return extract_mesh(field)
     bounds = edited_bounds(field.bounds, scene.patched_edits)
     if isinstance(field, SplatField):
-        source: SplatField | EditedField = replace(baked(scene), bounds=bounds)
+        source: SplatField | EditedField = replace(edited_splats(scene), bounds=bounds)
     else:
         source = EditedField(field, scene.patched_edits, bounds, scene.preserve_opacity)
     if resolution is None:
@@ -209,11 +209,11 @@ def inside(cages: tuple[Cage, ...], positions: NDArray[np.floating]) -> NDArray[
 
 
 def _sized(camera: Camera, middle: NDArray[np.float64], spacing: float) -> Camera:
-    """The camera with pixels of DETAIL voxels at the middle of the field, or its own finer ones."""
+    """The camera with pixels of PIXELS_PER_VOXEL voxels at the middle of the field, or its own finer ones."""
     own = max(camera.width, camera.height)
     distance = float(np.linalg.norm(camera.origin - middle))
-    wanted = own * distance / (camera.fx * DETAIL * spacing)
-    side = min(LONGEST_SIDE, max(own, wanted))
+    wanted = own * distance / (camera.fx * PIXELS_PER_VOXEL * spacing)
+    side = min(MAX_IMAGE_SIDE_PX, max(own, wanted))
     return camera.resized(max(1, round(camera.width * side / own)), max(1, round(camera.height * side / own)))
 
 
@@ -221,7 +221,7 @@ def _rings(bounds: NDArray[np.float64], up: NDArray[np.float64]) -> tuple[Camera
     radius = 0.5 * float(np.linalg.norm(bounds[1] - bounds[0])) / math.sin(0.5 * FOV_X)
     return tuple(
         camera
-        for elevation, count in RINGS
+        for elevation, count in FITTING_RINGS
         for camera in turntable(
             bounds.mean(axis=0), radius, count, elevation=math.radians(elevation), up=up,
             width=400, height=400, fov_x=FOV_X,

@@ -15,7 +15,7 @@ import numpy as np
 from cagefield.errors import FieldError
 from cagefield.fields.tensor_file import Tensor, read_header
 from cagefield.files.atomic import replaced_file
-from cagefield.files.memory import lacking_memory
+from cagefield.files.memory import memory_shortage
 from cagefield.files.safe_open import UnreadableError, check_regular, open_regular
 
 
@@ -63,7 +63,7 @@ def _opened(path: str | Path) -> Iterator[tuple[BinaryIO, dict[str, str], dict[s
     """(open file, its metadata, its tensors); errors within the context become FieldErrors."""
     try:
         with open_regular(path) as file:
-            if (lacking := lacking_memory(check_regular(path))) is not None:
+            if (lacking := memory_shortage(check_regular(path))) is not None:
                 raise FieldError(f"{path}: {lacking}")
             yield file, *read_header(file)
     except PermissionError as error:

@@ -11,8 +11,8 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from cagefield.files.rename_exchange import exchanged
-from cagefield.files.stale_files import hidden_name, is_hidden, put_aside, remove_leftovers
+from cagefield.files.rename_exchange import exchange_names
+from cagefield.files.stale_files import displaced_folders, hidden_name, is_hidden, remove_leftovers
 
 
 def check_writable(path: Path, *, inside: bool = False) -> None:
@@ -130,7 +130,7 @@ def replaced_folder(target: Path, own: Collection[str]) -> Iterator[Path]:
                 draft.rename(target)
             else:
                 draft.chmod(stat.S_IMODE(target.stat().st_mode))
-                if exchanged(draft, target):
+                if exchange_names(draft, target):
                     retired = draft
                 else:
                     target.rename(retired)
@@ -156,7 +156,7 @@ def recover_folder(target: Path, is_whole: Callable[[Path], bool]) -> Path | Non
     """
     if target.exists() or not target.parent.is_dir():
         return None
-    left = [folder for folder in put_aside(target) if is_whole(folder)]
+    left = [folder for folder in displaced_folders(target) if is_whole(folder)]
     if not left:
         return None
     newest = max(left, key=lambda folder: folder.stat().st_mtime)

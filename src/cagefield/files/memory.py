@@ -21,7 +21,7 @@ def free_memory() -> int | None:
     return min(free, default=None)
 
 
-def lacking_memory(needed: int) -> str | None:
+def memory_shortage(needed: int) -> str | None:
     """Error message with its cure where `needed` bytes exceed the available memory; None otherwise."""
     free = free_memory()
     if free is None or needed <= free:

@@ -11,7 +11,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.files.memory import lacking_memory
+from cagefield.files.memory import memory_shortage
 from cagefield.files.safe_open import open_regular
 
 DEFLATED = 1040
@@ -34,7 +34,7 @@ def read_arrays(path: Path, times: int = 1) -> dict[str, NDArray[Any]]:
             unpacked = sum(entry.file_size for entry in entries)
             if unpacked > times * size:
                 raise ValueError(f"it says that it unpacks to {unpacked} bytes")
-            if (lacking := lacking_memory(unpacked)) is not None:
+            if (lacking := memory_shortage(unpacked)) is not None:
                 raise ValueError(lacking)
             return {entry.filename.removesuffix(".npy"): _array(archive, entry) for entry in entries}
     except OSError:
@@ -54,7 +54,7 @@ def read_array(path: Path) -> NDArray[Any]:
             needed = _bytes_of(file)
             if needed != size - file.tell():
                 raise ValueError(f"it says that it is an array of {needed} bytes")
-            if (lacking := lacking_memory(needed)) is not None:
+            if (lacking := memory_shortage(needed)) is not None:
                 raise ValueError(lacking)
             file.seek(0)
             return _values(file)

@@ -15,7 +15,7 @@ _UNABLE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP, errno.EPERM)
 """Error numbers of systems and (network) file systems that cannot exchange names."""
 
 
-def exchanged(one: Path, other: Path) -> bool:
+def exchange_names(one: Path, other: Path) -> bool:
     """Exchange two existing names atomically; False where the system cannot.
 
     Raises OSError where it is refused for another reason.

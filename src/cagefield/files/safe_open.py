@@ -17,7 +17,7 @@ from numpy.typing import DTypeLike
 from cagefield.errors import FieldError
 from cagefield.typing import AnyArray
 
-MOST_TEXT = 32 << 20
+MAX_TEXT_BYTES = 32 << 20
 """Bytes of a text that is read whole: JSON of some 20,000 cameras."""
 
 FileState: TypeAlias = tuple[int, int] | None
@@ -56,7 +56,7 @@ def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
     return file
 
 
-def read_bytes(path: str | os.PathLike[str], most: int = MOST_TEXT) -> bytes:
+def read_bytes(path: str | os.PathLike[str], most: int = MAX_TEXT_BYTES) -> bytes:
     """All bytes of a regular file, at most `most`. Raises as `open_regular`."""
     part, content = max(_PART, check_regular(path, most) + 1), b""
     with open_regular(path) as file:
@@ -67,7 +67,7 @@ def read_bytes(path: str | os.PathLike[str], most: int = MOST_TEXT) -> bytes:
     return content
 
 
-def read_text(path: str | os.PathLike[str], most: int = MOST_TEXT) -> str:
+def read_text(path: str | os.PathLike[str], most: int = MAX_TEXT_BYTES) -> str:
     r"""The text of a regular file in UTF-8, at most `most` bytes; its lines end with \n.
 
     Raises as `open_regular`, and UnicodeDecodeError.

@@ -42,7 +42,7 @@ def is_abandoned(path: Path) -> bool:
     return found is not None and found[3] == host() and not is_alive(int(found[4]))
 
 
-def put_aside(target: Path) -> list[Path]:
+def displaced_folders(target: Path) -> list[Path]:
     """The folders of exactly its name that programs have put aside beside `target`, where nothing is now.
 
     A maker that has another host's name (a container's), or a number that is a process's again, cannot be

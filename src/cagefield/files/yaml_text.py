@@ -7,10 +7,10 @@ from typing import Any
 
 import yaml
 
-MOST_VALUES = 250_000
+MAX_VALUES = 250_000
 """Values of a text, aliases followed: seconds to be read."""
 
-DEEPEST = 20
+MAX_NESTING = 20
 
 _HALF = re.compile(r"\\(u|U0000)[dD][89a-fA-F]")
 _Fast: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -88,10 +88,10 @@ def _check_extent(text: str, loader: Any) -> None:
         if isinstance(event, yaml.NodeEvent):
             values += 1
         line = event.start_mark.line + 1 if event.start_mark else 0
-        if depth > DEEPEST + 1:
+        if depth > MAX_NESTING + 1:
             raise YamlError("nested too deeply", line)
-        if values > 2 * MOST_VALUES:  # keys are events too
-            raise YamlError(f"more than {MOST_VALUES} values", line)
+        if values > 2 * MAX_VALUES:  # keys are events too
+            raise YamlError(f"more than {MAX_VALUES} values", line)
 
 
 def _count(node: yaml.Node, known: dict[int, tuple[int, int]], above: set[int]) -> tuple[int, int]:
@@ -99,7 +99,7 @@ def _count(node: yaml.Node, known: dict[int, tuple[int, int]], above: set[int]) 
     if id(node) in known:
         return known[id(node)]
     line = node.start_mark.line + 1
-    if id(node) in above or len(above) > DEEPEST:
+    if id(node) in above or len(above) > MAX_NESTING:
         raise YamlError("nested too deeply", line)
     values, depth = 1, 0
     if isinstance(node, yaml.CollectionNode):
@@ -108,9 +108,9 @@ def _count(node: yaml.Node, known: dict[int, tuple[int, int]], above: set[int]) 
             inner = _count(item[1] if isinstance(item, tuple) else item, known, above)
             values, depth = values + inner[0], max(depth, inner[1] + 1)
         above.discard(id(node))
-    if values > MOST_VALUES:
-        raise YamlError(f"more than {MOST_VALUES} values", line)
-    if depth > DEEPEST:
+    if values > MAX_VALUES:
+        raise YamlError(f"more than {MAX_VALUES} values", line)
+    if depth > MAX_NESTING:
         raise YamlError("nested too deeply", line)
     known[id(node)] = values, depth
     return values, depth

@@ -25,14 +25,14 @@ from cagefield.typing import Array, Float32
 Up = Literal["y-down", "y-up", "z-up", "z-down", "x-up", "x-down"]
 Cameras = dict[str, tuple[Camera, ...]]
 
-FAR = 8.0
+FAR_SHARE = 8.0
 """A file holds surroundings where the farthest hundredth of its splats is this many times as far from the
 middle as half of them."""
 
-MARGIN = 0.05
+BOX_MARGIN_SHARE = 0.05
 """Room around the splats in the box, in shares of its size."""
 
-RINGS = ((0.0, 16), (25.0, 16), (50.0, 16))
+CAMERA_RINGS = ((0.0, 16), (25.0, 16), (50.0, 16))
 """Elevation, degrees, and number of cameras to look from; those of the test views lie between them."""
 
 TEST_RING = (12.0, 8)
@@ -75,7 +75,7 @@ def import_splats(
         np.maximum(distance, np.abs(column - at), out=distance)
     half, far = np.quantile(distance, (0.5, 0.99))
     if unbounded is None:
-        unbounded = bool(far > FAR * half)
+        unbounded = bool(far > FAR_SHARE * half)
     if unbounded:
         reach = max(1.5 * float(half), 1e-6)
         bounds = np.stack([middle - reach, middle + reach])
@@ -104,7 +104,7 @@ def _columns(means: Float32) -> Iterator[Array]:
 def _whole(means: Float32) -> Array:
     """The box of nearly all means, with room around it."""
     low, high = np.stack([np.quantile(column, (0.001, 0.999)) for column in _columns(means)], axis=1)
-    room = MARGIN * max(float((high - low).max()), 1e-6)
+    room = BOX_MARGIN_SHARE * max(float((high - low).max()), 1e-6)
     return np.stack([low - room, high + room])
 
 
@@ -121,7 +121,10 @@ def _rings(field: SplatField, up: Up) -> Cameras:
             width=SIDE, height=SIDE, fov_x=FOV_X,
         )  # fmt: skip
 
-    return {"train": tuple(camera for part in RINGS for camera in ring(*part)), "test": ring(*TEST_RING)}
+    return {
+        "train": tuple(camera for part in CAMERA_RINGS for camera in ring(*part)),
+        "test": ring(*TEST_RING),
+    }
 
 
 def _cameras(dataset: Dataset, offset: Array) -> Cameras:

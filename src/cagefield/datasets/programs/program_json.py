@@ -7,10 +7,10 @@ from typing import Any
 
 from cagefield.datasets.transforms.transforms_json import read_json
 from cagefield.errors import DatasetError
-from cagefield.files.safe_open import MOST_TEXT
+from cagefield.files.safe_open import MAX_TEXT_BYTES
 
 
-def read_object(path: Path, max_bytes: int = MOST_TEXT) -> dict[str, Any]:
+def read_object(path: Path, max_bytes: int = MAX_TEXT_BYTES) -> dict[str, Any]:
     """Object of a JSON file of at most `max_bytes`; numbers may be infinite or NaN.
 
     Raises DatasetError where the content is no object.

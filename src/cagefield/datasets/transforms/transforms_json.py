@@ -14,7 +14,7 @@ import numpy.typing as npt
 from cagefield.cameras.camera_checks import RIGID_TOLERANCE
 from cagefield.errors import DatasetError
 from cagefield.files import json_text
-from cagefield.files.safe_open import MOST_TEXT, read_bytes
+from cagefield.files.safe_open import MAX_TEXT_BYTES, read_bytes
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -26,7 +26,7 @@ _COMMA_PATTERN = re.compile(_STRING + r"|,(?=\s*[}\]])", re.DOTALL)
 
 
 def read_json(
-    path: Path, max_bytes: int = MOST_TEXT, expected: str = "with the key 'frames'"
+    path: Path, max_bytes: int = MAX_TEXT_BYTES, expected: str = "with the key 'frames'"
 ) -> dict[str, Any]:
     """Object of a JSON file of at most `max_bytes`, in UTF-8, or UTF-16 with its byte order mark.
 

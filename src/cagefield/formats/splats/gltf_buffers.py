@@ -20,9 +20,9 @@ from urllib.parse import unquote, urlsplit
 import numpy as np
 
 from cagefield.files import json_text
-from cagefield.files.memory import lacking_memory
+from cagefield.files.memory import memory_shortage
 from cagefield.files.safe_open import (
-    MOST_TEXT,
+    MAX_TEXT_BYTES,
     check_regular,
     open_regular,
     read_array,
@@ -246,7 +246,7 @@ def _sparse(
 
 def _text(path: Path) -> dict[str, Any]:
     size = check_regular(path, MAX_EMBEDDED_BYTES)
-    if (lacking := lacking_memory(4 * size)) is not None:
+    if (lacking := memory_shortage(4 * size)) is not None:
         raise ValueError(f"its text of {size} bytes is too long: {lacking}")
     return _mapping(json_text.loads(read_bytes(path, MAX_EMBEDDED_BYTES).decode("utf-8-sig")))
 
@@ -261,8 +261,8 @@ def _chunks(path: Path) -> tuple[dict[str, Any], tuple[int, int] | None]:
         length, kind = struct.unpack("<II", file.read(8))
         if kind != JSON_CHUNK or 20 + length > size:
             raise ValueError("its JSON is cut off")
-        if length > MOST_TEXT:
-            raise ValueError(f"its JSON has {length} bytes, at most {MOST_TEXT} are read")
+        if length > MAX_TEXT_BYTES:
+            raise ValueError(f"its JSON has {length} bytes, at most {MAX_TEXT_BYTES} are read")
         gltf = _mapping(json_text.loads(file.read(length)))
         head = file.read(8)
         if not head:

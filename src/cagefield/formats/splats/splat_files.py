@@ -15,7 +15,7 @@ import numpy as np
 from cagefield.errors import FieldError
 from cagefield.fields import sh as spherical_harmonics
 from cagefield.fields.splat_field import NO_OFFSET, Offset, SplatField
-from cagefield.files.memory import lacking_memory
+from cagefield.files.memory import memory_shortage
 from cagefield.formats.splats.antimatter15_splat import write_splat_rows
 from cagefield.formats.splats.axes import PLY_AXES, Axes, axis_signs, convert_axes
 from cagefield.formats.splats.compressed_ply import write_compressed_ply
@@ -77,7 +77,7 @@ def open_within_memory(path: Path) -> SplatSource:
     """Open splat file. Raises FieldError as `open_splats`, and for splats that exceed the memory."""
     source = open_splats(path)
     needed = 4 * source.count * sum(map(math.prod, _shapes(source)))
-    if (lacking := lacking_memory(needed)) is not None:
+    if (lacking := memory_shortage(needed)) is not None:
         raise FieldError(f"{path}: its {source.count} splats are too many: {lacking}")
     return source
 

@@ -16,7 +16,7 @@ from cagefield.edits.safe_fraction import largest_safe
 from cagefield.errors import CagefieldError, EditError
 from cagefield.geometry.cage import EDGES, FACES, Cage
 from cagefield.server.editor.document import Entry
-from cagefield.server.editor.pasting import cropped, why_not_cropped
+from cagefield.server.editor.pasting import crop_paste, crop_problem
 from cagefield.server.editor.validity import INSIDE_OUT, cause, problem
 
 _ROUNDING = 1e-3
@@ -118,7 +118,7 @@ def _cages_alone(edit: Edit, target: Target, operation: Operation) -> Moved:
             return False
         return not was_fine or problem(moved) is None
 
-    if edit.source is not None and (refusal := why_not_cropped(edit, operation)) is not None:
+    if edit.source is not None and (refusal := crop_problem(edit, operation)) is not None:
         return Moved(edit, 0.0, refusal)
     part = largest_safe(safe)
     if part >= 1.0:
@@ -132,7 +132,7 @@ def _cages_alone(edit: Edit, target: Target, operation: Operation) -> Moved:
 
 def _set_cages(edit: Edit, target: Target, operation: Operation) -> Edit:
     if edit.source is not None:
-        return cropped(edit, operation.apply(edit.deformed))
+        return crop_paste(edit, operation.apply(edit.deformed))
     inner = edit.inner if target == "outer" else operation.apply(edit.inner)
     outer = edit.outer
     if outer is not None and target == "outer":

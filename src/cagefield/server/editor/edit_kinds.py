@@ -7,7 +7,7 @@ from typing import Any, Literal, TypeAlias
 
 from cagefield.edits import Edit
 from cagefield.errors import EditError
-from cagefield.server.editor.cage_placement import MARGIN, outer_around
+from cagefield.server.editor.cage_placement import OUTER_CAGE_MARGIN_SHARE, outer_cage_around
 from cagefield.server.editor.document import Entry, Spare
 
 Kind: TypeAlias = Literal["continuous", "move", "copy", "delete"]
@@ -46,7 +46,7 @@ def with_kind(entry: Entry, kind: Kind) -> Entry:
         if edit.shell == "flow":
             changes |= {"falloff": kept.falloff, "width": kept.width}
         if edit.outer is None:
-            changes["outer"] = outer_around(edit, _margin(edit))
+            changes["outer"] = outer_cage_around(edit, _margin(edit))
     return replace(entry, edit=edit.replace(**changes), spare=kept)
 
 
@@ -69,4 +69,4 @@ def _fades(edit: Edit) -> bool:
 
 def _margin(edit: Edit) -> float:
     low, high = edit.inner.aabb
-    return MARGIN * float((high - low).max())
+    return OUTER_CAGE_MARGIN_SHARE * float((high - low).max())

@@ -1,6 +1,6 @@
 """Undo history: the sequence of states and the index of the present one.
 
-A new entry replaces the undone entries. Beyond `LONGEST` entries the oldest after the initial state is
+A new entry replaces the undone entries. Beyond `MAX_ENTRIES` entries the oldest after the initial state is
 dropped; the initial state always stays.
 """
 
@@ -11,7 +11,7 @@ from typing import Generic, TypeVar
 
 T = TypeVar("T")
 
-LONGEST = 500
+MAX_ENTRIES = 500
 """Entries at most: all names go to every page with every change, for as many hours as it is edited."""
 
 
@@ -36,7 +36,7 @@ class History(Generic[T]):
     def push(self, name: str, state: T) -> History[T]:
         """History with one more entry after the present one and without the undone ones."""
         keep = self.entry + 1
-        first = 1 + max(0, keep + 1 - LONGEST)
+        first = 1 + max(0, keep + 1 - MAX_ENTRIES)
         names = (self.names[0], *self.names[first:keep], name)
         return History(names, (self.states[0], *self.states[first:keep], state), len(names) - 1)
 

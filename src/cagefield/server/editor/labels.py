@@ -12,7 +12,7 @@ _OPTIONS = {"relight": "shadows"}
 _WORDS = {"translation": "Move", "rotation": "Rotate", "scaling": "Scale", "shear": "Shear"}
 
 
-def named(operation: Operation, target: Target, entry: Entry) -> str:
+def edit_label(operation: Operation, target: Target, entry: Entry) -> str:
     """An operation as the history lists it."""
     return f"{_WORDS.get(operation.noun, operation.noun.capitalize())}{_TARGETS[target]}{of(entry)}"
 

@@ -17,7 +17,7 @@ from cagefield.geometry.cage import FACES, Cage
 from cagefield.typing import Array
 
 
-def mirrored(edit: Edit, axis: int, at: float) -> Edit:
+def mirror_edit(edit: Edit, axis: int, at: float) -> Edit:
     """The edit across the plane where coordinate `axis` is `at`."""
     return edit.replace(
         inner=mirrored_cage(edit.inner, axis, at),

@@ -12,18 +12,18 @@ from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 from cagefield.warps.hexahedron_map import HexahedronMap
 
-SHARE_OF_VIEW = 0.5
+PASTE_VIEW_SHARE = 0.5
 """Longest edge of pasted content, as a share of the view's height at the surface below it."""
 
 BENT = "what is pasted was bent; take the moves of its corners back, then set its cage"
 TURNED = "the cage of a paste shrinks, grows and moves in Set mode; turn it in Edit mode (Tab)"
 
 
-def pasted(
+def build_paste(
     source: str, name: str, box: Array, source_up: Array, at: Array, up: Array, view_height: float
 ) -> Edit:
     """The paste of a whole scene, whose box [2,3] and up direction are given, upright on a point [3]."""
-    size = SHARE_OF_VIEW * view_height
+    size = PASTE_VIEW_SHARE * view_height
     return placed_paste(source, box, at, up=up, source_up=source_up, size=size, name=name)
 
 
@@ -32,7 +32,7 @@ def cage_in_scene(edit: Edit) -> Cage:
     return edit.inner if edit.source is None else edit.deformed
 
 
-def cropped(edit: Edit, cage: Cage) -> Edit:
+def crop_paste(edit: Edit, cage: Cage) -> Edit:
     """The paste with another cage, given where it stands, around content that stays where it is.
 
     Raises EditError where its operations do not allow that.
@@ -48,10 +48,10 @@ def cropped(edit: Edit, cage: Cage) -> Edit:
     return there
 
 
-def why_not_cropped(edit: Edit, operation: Operation) -> str | None:
+def crop_problem(edit: Edit, operation: Operation) -> str | None:
     """Why an operation of Set mode cannot be done to a paste's cage, not even a little of it; or None."""
     try:
-        cropped(edit, operation.part(0.01).apply(edit.deformed))
+        crop_paste(edit, operation.part(0.01).apply(edit.deformed))
     except EditError as error:
         return str(error)
     except CageError:

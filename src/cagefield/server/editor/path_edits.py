@@ -11,7 +11,7 @@ from cagefield.server.editor.document import Document
 from cagefield.server.editor.validity import problem
 
 
-def blended(
+def edits_at_time(
     document: Document,
     parts: Mapping[int, float],
     known_problem: Callable[[Edit], str | None] = problem,

@@ -37,7 +37,7 @@ from cagefield.server.editor.session import Session
 CAMERA_PATH = "camera_path.json"
 _EDITS = "edits.yaml"
 
-MOST_DAMAGED = 5
+MAX_DAMAGED_AUTOSAVES = 5
 """Autosaves of a scene that could not be read and are kept."""
 
 
@@ -121,8 +121,8 @@ class SceneStore:
         return None if document == self.document() else document
 
     def _damaged_path(self) -> Path:
-        """Where the next damaged autosave is kept: a name that is free, or the last of MOST_DAMAGED."""
-        names = (".damaged", *(f".damaged-{n}" for n in range(2, MOST_DAMAGED + 1)))
+        """Path for the next damaged autosave: a free name, or the last of MAX_DAMAGED_AUTOSAVES."""
+        names = (".damaged", *(f".damaged-{n}" for n in range(2, MAX_DAMAGED_AUTOSAVES + 1)))
         paths = [self.autosave_path.with_suffix(name) for name in names]
         return next((path for path in paths if not path.exists()), paths[-1])
 

@@ -18,17 +18,17 @@ from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
 from cagefield.server.editor.active_drags import Drags
-from cagefield.server.editor.cage_placement import outer_around, pair_around
+from cagefield.server.editor.cage_placement import cage_pair_around, outer_cage_around
 from cagefield.server.editor.document import Document, Entry
 from cagefield.server.editor.drag_solver import Moved, Target, move
 from cagefield.server.editor.edit_kinds import Kind, with_kind, with_shell
 from cagefield.server.editor.edit_texts import ReadEdits, edits_in
 from cagefield.server.editor.history import History
 from cagefield.server.editor.identity_cache import IdentityCache
-from cagefield.server.editor.labels import fresh_name, named, of, option_word
-from cagefield.server.editor.mirror import mirrored
-from cagefield.server.editor.pasting import cropped
-from cagefield.server.editor.path_edits import blended
+from cagefield.server.editor.labels import edit_label, fresh_name, of, option_word
+from cagefield.server.editor.mirror import mirror_edit
+from cagefield.server.editor.pasting import crop_paste
+from cagefield.server.editor.path_edits import edits_at_time
 from cagefield.server.editor.path_preview import Preview
 from cagefield.server.editor.validity import problem
 from cagefield.typing import Array
@@ -134,7 +134,7 @@ class Session:
         entry = self.document.entry(drag.before.id)
         moved = move(entry, drag.target, operation)
         if moved.part > 0.0 and moved.edit != entry.edit:
-            self._put(named(operation, drag.target, entry), replace(entry, edit=moved.edit))
+            self._put(edit_label(operation, drag.target, entry), replace(entry, edit=moved.edit))
         return moved
 
     def drag_cancel(self, page: int) -> None:
@@ -166,7 +166,7 @@ class Session:
             return
         self.preview = None
         self.revision += 1
-        edits = blended(self.document, preview.parts(seconds), self.problem)
+        edits = edits_at_time(self.document, preview.parts(seconds), self.problem)
         self.preview = replace(preview, edits=edits)
 
     def play_end(self, page: int, number: int | None = None) -> None:
@@ -184,7 +184,7 @@ class Session:
         moved = move(entry, target, operation)
         if moved.part < 1.0:
             raise EditError(f"{moved.why}; {moved.part:.0%} of it is possible")
-        self._put(named(operation, target, entry), replace(entry, edit=moved.edit))
+        self._put(edit_label(operation, target, entry), replace(entry, edit=moved.edit))
         return moved
 
     # ---- cages ----
@@ -193,12 +193,12 @@ class Session:
         """The "inner" or "outer" cage by its corners; the field does not move."""
         entry = self._unlocked(number)
         pasted = entry.edit.source is not None and which == "inner"
-        edit = cropped(entry.edit, cage) if pasted else entry.edit.replace(**{which: cage})
+        edit = crop_paste(entry.edit, cage) if pasted else entry.edit.replace(**{which: cage})
         self._put(f"Set {which} cage{of(entry)}", replace(entry, edit=edit))
 
     def place(self, point: Array, view_height: float) -> int:
         """The number of a new continuous edit, selected, its cages around a point [3] of a surface."""
-        inner, outer = pair_around(point, view_height, self.bounds, self.voxel)
+        inner, outer = cage_pair_around(point, view_height, self.bounds, self.voxel)
         edit = Edit(inner, outer, name=fresh_name(self.document, "edit"), lattice=LATTICE)
         return self._add("Place cages", edit)
 
@@ -217,7 +217,7 @@ class Session:
     def outer_margin(self, number: int, margin: float) -> None:
         """The outer cage as a margin around all that the inner cage is and was."""
         entry = self._unlocked(number)
-        outer = outer_around(entry.edit, margin)
+        outer = outer_cage_around(entry.edit, margin)
         self._put(f"Outer margin{of(entry)}", replace(entry, edit=entry.edit.replace(outer=outer)))
 
     # ---- options and the list ----
@@ -274,7 +274,7 @@ class Session:
         entry = self.document.entry(number)
         if entry.edit.source is not None:
             raise EditError(f'edit "{entry.edit.name}" is pasted; what is pasted cannot be mirrored')
-        edit = mirrored(entry.edit, axis, float(self.bounds[:, axis].mean()))
+        edit = mirror_edit(entry.edit, axis, float(self.bounds[:, axis].mean()))
         edit = edit.replace(name=fresh_name(self.document, entry.edit.name or "edit"))
         return self._add(f"Mirror{of(entry)}", edit, at=self.document.place(number) + 1)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cagefield.edits import Edit
 
-OUTSIDE = "the inner cage must stay inside the outer cage; enlarge the outer cage (Set mode)"
+OUTSIDE_MESSAGE = "the inner cage must stay inside the outer cage; enlarge the outer cage (Set mode)"
 FOLDED = "the space between the cages would fold; enlarge the outer cage (Set mode), or choose the flow shell"
 CLOSE = "the inner cage is too close to the outer cage or bent too far; enlarge the outer cage (Set mode)"
 INSIDE_OUT = "the cage would turn inside out; keep its corners apart"
@@ -16,7 +16,7 @@ def problem(edit: Edit) -> str | None:
         return None
     outer = edit.outer
     if outer is not None and not outer.contains([*edit.inner.corners, *edit.deformed.corners]).all():
-        return OUTSIDE
+        return OUTSIDE_MESSAGE
     return FOLDED if edit.shell == "trilinear" else CLOSE
 
 

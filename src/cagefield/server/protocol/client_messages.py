@@ -11,7 +11,7 @@ from cagefield.edits.options import LATTICE_RANGE
 from cagefield.server.editor.drag_solver import Target
 from cagefield.server.editor.edit_kinds import Kind
 from cagefield.server.protocol.common import (
-    MOST_BYTES,
+    MAX_MESSAGE_BYTES,
     CameraMessage,
     Corners,
     DrawnHere,
@@ -244,7 +244,7 @@ class LoadEdits(Message):
     """An edit file's text: replaces the stack, or (paste) is appended to it."""
 
     type: Literal["load_edits"] = "load_edits"
-    text: Annotated[str, Field(max_length=MOST_BYTES)]
+    text: Annotated[str, Field(max_length=MAX_MESSAGE_BYTES)]
     append: bool = False
 
 

@@ -43,7 +43,7 @@ Corner: TypeAlias = Annotated[int, Field(ge=0, le=7)]
 Text: TypeAlias = Annotated[str, Field(max_length=200)]
 EditId: TypeAlias = Annotated[int, Field(ge=1)]
 
-MOST_BYTES = 1 << 20
+MAX_MESSAGE_BYTES = 1 << 20
 """Largest message that is taken from a page."""
 
 

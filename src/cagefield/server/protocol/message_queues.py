@@ -10,13 +10,13 @@ from pydantic_core import PydanticSerializationError
 
 from cagefield.server.protocol import client_messages, server_messages
 
-MOST_WAITING = 200
+MAX_WAITING_MESSAGES = 200
 """Messages that wait for a page that takes none; older ones are dropped."""
 
-MOST_BYTES_WAITING = 32 << 20
+MAX_WAITING_BYTES = 32 << 20
 """Bytes that wait for a page; with more it has to come again."""
 
-MOST_RECEIVED = 64
+MAX_RECEIVED_MESSAGES = 64
 """Messages of a page that wait to be done; no more are read meanwhile."""
 
 
@@ -36,7 +36,7 @@ class SendQueue:
         superseded = message.supersedes()
         if superseded is not None:
             self.waiting = deque(item for item in self.waiting if item[0] != superseded)
-        elif len(self.waiting) >= MOST_WAITING:
+        elif len(self.waiting) >= MAX_WAITING_MESSAGES:
             self.waiting.popleft()
         self._append(message.redundancy_key(), _text(message))
 
@@ -53,7 +53,7 @@ class SendQueue:
         if self._ended:
             return
         size = sum(len(item[1] or "") for item in self.waiting) + len(content or "")
-        if size > MOST_BYTES_WAITING and self.waiting:
+        if size > MAX_WAITING_BYTES and self.waiting:
             self.waiting.clear()
             key = content = None
             self._ended = True
@@ -97,7 +97,7 @@ class ReceiveQueue:
 
     async def room(self) -> None:
         """Returns when there is room for one more message."""
-        while len(self.waiting) >= MOST_RECEIVED:
+        while len(self.waiting) >= MAX_RECEIVED_MESSAGES:
             self._room.clear()
             await self._room.wait()
 

@@ -25,7 +25,7 @@ from cagefield.server.render_queue.damage import WHOLE, Rect, screen_bounds
 from cagefield.server.render_queue.dispatcher import BackgroundTask, Dispatcher, Stamp, TooManyError
 from cagefield.server.render_queue.patch_extent import PatchExtent
 from cagefield.server.render_queue.requests import EditsRequest, Request
-from cagefield.server.render_queue.splat_extent import spread
+from cagefield.server.render_queue.splat_extent import splat_extent
 from cagefield.server.render_worker.tasks import (
     EditsDone,
     Failed,
@@ -73,7 +73,7 @@ class Coordinator:
         self.loading = asyncio.Lock()
         """Held while an edit file of a page is read."""
         shown = store.scene.field
-        self.spread = spread(shown) if isinstance(shown, SplatField) else 0.0
+        self.spread = splat_extent(shown) if isinstance(shown, SplatField) else 0.0
         """How far beside where an edit maps points its content shows, world units."""
         self._patches = PatchExtent(shown)
         self.dispatcher = Dispatcher(str(store.origin), device, self, whole_at_rest=self.spread > 0.0)

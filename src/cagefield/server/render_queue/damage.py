@@ -29,10 +29,10 @@ WHOLE: Rect = (0.0, 0.0, 1.0, 1.0)
 Differing: TypeAlias = Callable[[int, int, int], Rect | None]
 """(page, one revision, another) -> where they may differ in the page's picture; None for nowhere."""
 
-LEAST = 16
+MIN_PART_SIDE_PX = 16
 """Least width and height of a part that is rendered, pixels."""
 
-BESIDE = 2.0
+PART_MARGIN_PX = 2.0
 """Margin of a part on each side, pixels: enlarging a coarse image smooths its edge."""
 
 
@@ -73,8 +73,10 @@ def pixels(rect: Rect | None, width: int, height: int) -> tuple[int, int, int, i
     for low, high, n in ((0, 2, width), (1, 3, height)):
         a, b = (0.5, 0.5) if rect is None else (rect[low], rect[high])
         # Even, since of distances every other one is sent.
-        first = min(max(0, 2 * math.floor((a * n - BESIDE) / 2)), max(0, 2 * ((n - LEAST) // 2)))
-        last = max(min(n, 2 * math.ceil((b * n + BESIDE) / 2)), min(n, first + LEAST))
+        first = min(
+            max(0, 2 * math.floor((a * n - PART_MARGIN_PX) / 2)), max(0, 2 * ((n - MIN_PART_SIDE_PX) // 2))
+        )
+        last = max(min(n, 2 * math.ceil((b * n + PART_MARGIN_PX) / 2)), min(n, first + MIN_PART_SIDE_PX))
         spans.append((first, last - first))
     return spans[0][0], spans[1][0], spans[0][1], spans[1][1]
 

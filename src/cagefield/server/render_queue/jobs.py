@@ -11,7 +11,7 @@ from cagefield.cameras.keyframes import Still, stills
 from cagefield.errors import CagefieldError
 from cagefield.images.video import is_cagefield_video
 from cagefield.server.editor.document import Document
-from cagefield.server.editor.path_edits import blended
+from cagefield.server.editor.path_edits import edits_at_time
 from cagefield.server.protocol.common import JobKind
 from cagefield.server.render_worker.job_files import MARK
 from cagefield.server.render_worker.tasks import FrameTask, Shown, values_of
@@ -37,7 +37,7 @@ class Job:
     def task(self, number: int, generation: int) -> FrameTask:
         """The next picture. Raises CagefieldError where its edits, blended as they are there, fail."""
         still = self.stills[self.done]
-        edits = blended(self.document, still.parts)
+        edits = edits_at_time(self.document, still.parts)
         shown = Shown(values_of(edits), self.document.preserve_opacity)
         return FrameTask(
             number,

@@ -42,13 +42,13 @@ TILE_SECONDS = 0.25
 SETTLE_SECONDS = 0.12
 """How long nothing may have changed before the view counts as at rest."""
 
-MOST_TILES = 9
+MAX_TILES = 9
 """Tiles of a view, at most."""
 
-LEAST_SIDE = 80
+MIN_SIDE_PX = 80
 """Shorter side of the smallest moving picture, pixels."""
 
-SCALES = (1.0, 0.8, 0.65, 0.5, 0.4, 0.32, 0.25, 0.2, 0.16, 0.125)
+RESOLUTION_SCALES = (1.0, 0.8, 0.65, 0.5, 0.4, 0.32, 0.25, 0.2, 0.16, 0.125)
 """Resolutions of moving pictures as shares of the full one: a few, since each has its own ray directions."""
 
 FIRST_RATE = 4e5
@@ -344,8 +344,8 @@ class Scheduler:
         rays = self._rate * max(MOVING_SECONDS - self._overhead, 0.4 * MOVING_SECONDS)
         _, _, width, height = pixels(rect, p.width, p.height)
         wanted = math.sqrt(rays / (width * height))
-        least = min(1.0, LEAST_SIDE / min(p.width, p.height))
-        return max(next((s for s in SCALES if s <= wanted), SCALES[-1]), least)
+        least = min(1.0, MIN_SIDE_PX / min(p.width, p.height))
+        return max(next((s for s in RESOLUTION_SCALES if s <= wanted), RESOLUTION_SCALES[-1]), least)
 
     def _cut(self, page: int, exact: bool) -> None:
         """Divide the damaged part of the view into tiles of about TILE_SECONDS."""
@@ -359,6 +359,6 @@ class Scheduler:
             rect = union(rect, p.showing.coarse)
         part = pixels(rect, p.width, p.height)
         p.whole = part == (0, 0, p.width, p.height)
-        count = min(max(1.0, part[2] * part[3] / (self._rate * TILE_SECONDS)), MOST_TILES)
+        count = min(max(1.0, part[2] * part[3] / (self._rate * TILE_SECONDS)), MAX_TILES)
         p.tiles = [Region(*tile, p.width, p.height) for tile in tiles(part, count)]
         p.tiles_exact = exact

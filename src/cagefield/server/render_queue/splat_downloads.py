@@ -16,10 +16,10 @@ from cagefield.server.editor.persistence import SceneStore, stem_of
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import server_messages
 from cagefield.server.protocol.common import SplatForm
-from cagefield.server.render_worker.subprocess_task import in_own_process
+from cagefield.server.render_worker.subprocess_task import run_in_process
 from cagefield.server.render_worker.tasks import EditValues, values_of
 
-KEPT = 4
+MAX_KEPT_FILES = 4
 """Finished files that are kept for their download; older ones are removed."""
 
 
@@ -101,7 +101,7 @@ class Exports:
         edits = tuple(e for e in edits if e.changes_anything and self._session.problem(e) is None)
         path = self._path(export)
         try:
-            await in_own_process(
+            await run_in_process(
                 write_edited, str(self._store.origin), values_of(edits), document.preserve_opacity, str(path)
             )
         except asyncio.CancelledError:
@@ -113,7 +113,7 @@ class Exports:
             self._tell(_message(export, "failed", str(error)))
             return
         export.is_done = True
-        for old in [e for e in self._exports.values() if e.is_done][:-KEPT]:
+        for old in [e for e in self._exports.values() if e.is_done][:-MAX_KEPT_FILES]:
             self._forget(old)
         self._tell(_message(export, "done"))
 
@@ -126,13 +126,13 @@ def write_edited(scene: str, edits: tuple[EditValues, ...], preserve_opacity: bo
     """Writes the splats of a scene's folder under other edits than its own; returns how many there are."""
     import dataclasses
 
-    from cagefield.exporting import baked, upright
+    from cagefield.exporting import edited_splats, upright
     from cagefield.formats.splats.splat_files import write_splats
     from cagefield.scene.scene import Scene
 
     opened = Scene.open(scene)
     stack = EditStack(Edit(**values) for values in edits)
-    splats = baked(dataclasses.replace(opened, edits=stack, preserve_opacity=preserve_opacity))
+    splats = edited_splats(dataclasses.replace(opened, edits=stack, preserve_opacity=preserve_opacity))
     Path(out).parent.mkdir(parents=True, exist_ok=True)
     write_splats(upright(splats, opened.up), out)
     return len(splats)

@@ -6,11 +6,11 @@ import numpy as np
 
 from cagefield.fields.splat_field import SplatField
 
-SPREAD = 0.95
+SPLAT_EXTENT_QUANTILE = 0.95
 """Share of a field's opacity in splats that reach no farther than `spread`."""
 
 
-def spread(field: SplatField) -> float:
+def splat_extent(field: SplatField) -> float:
     """How far from its mean a splat shows, world units: all but the largest ones, weighted by opacity.
 
     Up to three standard deviations, where a hundredth of its opacity is left.
@@ -21,5 +21,5 @@ def spread(field: SplatField) -> float:
         return 0.0
     largest = field.log_scales.max(axis=1)
     order = np.argsort(largest)
-    at = np.searchsorted(np.cumsum(weights[order]), SPREAD * weights.sum())
+    at = np.searchsorted(np.cumsum(weights[order]), SPLAT_EXTENT_QUANTILE * weights.sum())
     return 3.0 * float(np.exp(np.float64(largest[order[min(at, len(order) - 1)]])))

@@ -12,7 +12,7 @@ class GivenUpError(Exception):
     """Cancellation: the result under construction is no longer wanted."""
 
 
-def giving_up(stop: Stop) -> Callable[[], None]:
+def cancellation_check(stop: Stop) -> Callable[[], None]:
     """A `proceed` callback that raises GivenUpError once `stop` returns True."""
 
     def proceed() -> None:

@@ -15,7 +15,7 @@ from cagefield.server.protocol.common import View
 NOTHING = 65535
 """Depth value where the picture shows nothing."""
 
-MOST_PLAIN = 16_384
+MAX_PLAIN_PIXELS = 16_384
 """Pixels of a picture that is sent as it is, at most."""
 
 Format = Literal["jpeg", "rgb"]
@@ -42,7 +42,7 @@ def picture_of(frame: RenderResult, view: View, reach: tuple[float, float]) -> N
 
 def plain_or_jpeg(pixels: NDArray[np.uint8], quality: int) -> tuple[bytes, Format]:
     """A picture's bytes and their format: to decode small ones would take a page longer than to read them."""
-    if pixels.shape[0] * pixels.shape[1] <= MOST_PLAIN:
+    if pixels.shape[0] * pixels.shape[1] <= MAX_PLAIN_PIXELS:
         return pixels.tobytes(), "rgb"
     return jpeg(pixels, quality), "jpeg"
 

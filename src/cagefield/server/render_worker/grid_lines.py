@@ -13,16 +13,16 @@ from scipy import ndimage
 from cagefield.edits import Edit, EditStack
 from cagefield.typing import Array
 
-LINES = 7
+LINES_PER_AXIS = 7
 """Lines along each axis, on each of the two axes across, the faces of the outer cage included."""
 
-POINTS = 33
+POINTS_PER_LINE = 33
 """Points of a line."""
 
-NODES = 25
+LATTICE_NODES = 25
 """Lattice nodes along an axis at which the map is sampled; an edit's own finer lattice shows no more."""
 
-ROUNDS = 30
+MAX_ITERATIONS = 30
 """Iterations of the inverse, damped by one half."""
 
 
@@ -33,14 +33,14 @@ def grid_lines(edit: Edit) -> list[list[list[float]]]:
     if edit.outer is None or edit.adjustment != "continuous":
         return []
     origin, frame = edit.outer.frame
-    stack = DeviceStack.from_stack(EditStack([edit.replace(lattice=NODES)]))
-    axis = np.linspace(0.0, 1.0, NODES)
+    stack = DeviceStack.from_stack(EditStack([edit.replace(lattice=LATTICE_NODES)]))
+    axis = np.linspace(0.0, 1.0, LATTICE_NODES)
     nodes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     at = (origin + nodes @ frame.T).astype(np.float32)
     along = np.tile(np.array([1.0, 0.0, 0.0], np.float32), (len(at), 1))
     mapped, _, _, _ = stack.to_canonical(at, along)
     inverse = np.linalg.inv(frame)
-    u = ((mapped - at).astype(np.float64) @ inverse.T).reshape(NODES, NODES, NODES, 3)
+    u = ((mapped - at).astype(np.float64) @ inverse.T).reshape(LATTICE_NODES, LATTICE_NODES, LATTICE_NODES, 3)
     lines = _straight()
     bent, fine = _bent(lines.reshape(-1, 3), u)
     world = (origin + bent @ frame.T).reshape(lines.shape)
@@ -52,8 +52,8 @@ def grid_lines(edit: Edit) -> list[list[list[float]]]:
 
 
 def _straight() -> Array:
-    """Lines [L,POINTS,3] along each axis through a LINES x LINES grid of the middle planes across."""
-    s, places = np.linspace(0.0, 1.0, POINTS), np.linspace(0.0, 1.0, LINES)
+    """Lines [L,POINTS_PER_LINE,3] along each axis, LINES_PER_AXIS^2 of them through its middle plane."""
+    s, places = np.linspace(0.0, 1.0, POINTS_PER_LINE), np.linspace(0.0, 1.0, LINES_PER_AXIS)
     found = []
     for axis in range(3):
         a, b = (axis + 1) % 3, (axis + 2) % 3
@@ -61,7 +61,7 @@ def _straight() -> Array:
             for q in places:
                 if min(abs(p - 0.5), abs(q - 0.5)) > 1e-9:
                     continue
-                line = np.empty((POINTS, 3))
+                line = np.empty((POINTS_PER_LINE, 3))
                 line[:, axis], line[:, a], line[:, b] = s, p, q
                 found.append(line)
     return np.stack(found)
@@ -71,14 +71,14 @@ def _bent(x: Array, u: Array) -> tuple[Array, Array]:
     """(p, converged) with p + u(p) = x, frame units."""
     p = x.copy()
     residual = np.zeros_like(p)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ITERATIONS):
         residual = x - p - _read(u, p)
         p = p + 0.5 * residual
     return p, np.abs(residual).max(axis=1) < 0.01
 
 
 def _read(u: Array, p: Array) -> Array:
-    at = np.clip(p, 0.0, 1.0).T * (NODES - 1)
+    at = np.clip(p, 0.0, 1.0).T * (LATTICE_NODES - 1)
     return np.stack(
         [ndimage.map_coordinates(u[..., a], at, order=1, mode="nearest") for a in range(3)], axis=1
     )

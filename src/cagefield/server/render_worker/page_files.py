@@ -19,7 +19,7 @@ from cagefield.rendering.splats.splitting import split_of
 from cagefield.rendering.voxels.occupancy import Occupancy
 from cagefield.rendering.voxels.voxel_renderer import Renderer
 from cagefield.server.editor.identity_cache import IdentityCache
-from cagefield.server.render_worker.cancellation import GivenUpError, Stop, giving_up
+from cagefield.server.render_worker.cancellation import GivenUpError, Stop, cancellation_check
 from cagefield.server.render_worker.edited_renderers import EditedRenderers
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.tasks import EditsDone, PageEditsTask, Stopped
@@ -85,7 +85,7 @@ class PageFiles:
         """
         if any(edit.source is not None for edit in shown):
             raise CagefieldError("the server draws what is pasted between scenes of splats")
-        began, proceed = time.perf_counter(), giving_up(stop)
+        began, proceed = time.perf_counter(), cancellation_check(stop)
         try:
             patcher = self._renderers.scene.patcher
             edits = patcher.prepare(shown, moving=not task.exact, proceed=proceed)
@@ -106,7 +106,9 @@ class PageFiles:
     def _renderer(
         self, renderers: EditedRenderers, edits: Sequence[Edit], task: PageEditsTask, stop: Stop
     ) -> Renderer:
-        renderer = renderers.renderer(edits, task.shown.preserve_opacity, task.exact, giving_up(stop))
+        renderer = renderers.renderer(
+            edits, task.shown.preserve_opacity, task.exact, cancellation_check(stop)
+        )
         if not isinstance(renderer, Renderer):
             raise CagefieldError(NOT_DRAWN)
         return renderer

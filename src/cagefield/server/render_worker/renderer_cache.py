@@ -19,7 +19,7 @@ from cagefield.images.render_result import RenderResult
 from cagefield.rendering.renderers import renderer_of
 from cagefield.scene.scene import Scene
 from cagefield.server.render_worker import encoding
-from cagefield.server.render_worker.cancellation import GivenUpError, Stop, giving_up
+from cagefield.server.render_worker.cancellation import GivenUpError, Stop, cancellation_check
 from cagefield.server.render_worker.edited_renderers import EditedRenderers
 from cagefield.server.render_worker.tasks import (
     EditValues,
@@ -35,7 +35,7 @@ from cagefield.typing import Float32
 if TYPE_CHECKING:
     from cagefield.rendering.renderers import AnyRenderer
 
-LONGEST_STEP = 1.5
+MAX_STEP_VOXELS = 1.5
 """Most voxels between samples while something moves; no more than a pixel shows, either."""
 
 MOVING_QUALITY, REST_QUALITY = 85, 95
@@ -47,7 +47,7 @@ KEPT_EDITS = 64
 KEPT_BYTES = 256 << 20
 """Bytes of the lattices of those of them that are not shown, at most."""
 
-MOST_DEPTHS = 120_000
+MAX_DEPTH_IMAGES = 120_000
 """Depths sent with a picture, at most."""
 
 
@@ -70,7 +70,9 @@ class RendererCache:
         began = time.perf_counter()
         try:
             renderer = (
-                self.plain if task.display.before else self.renderer(task.shown, task.exact, giving_up(stop))
+                self.plain
+                if task.display.before
+                else self.renderer(task.shown, task.exact, cancellation_check(stop))
             )
         except GivenUpError:
             return Stopped(task.number)
@@ -82,7 +84,7 @@ class RendererCache:
         near, far = self.reach(task.camera)
         pixels = encoding.picture_of(frame, task.display.view, (near, far))
         picture, form = encoding.plain_or_jpeg(pixels, MOVING_QUALITY if task.moving else REST_QUALITY)
-        few = not task.moving and frame.width * frame.height <= MOST_DEPTHS
+        few = not task.moving and frame.width * frame.height <= MAX_DEPTH_IMAGES
         stride = 1 if few else 2
         scale = (far if not self.scene.field.unbounded else 16.0 * far) / 65_000.0
         depth = encoding.depths(frame, scale, stride)
@@ -106,7 +108,9 @@ class RendererCache:
         task = PictureTask(0, shown, camera, region, display, stop is None, True, 0)
         stopping = stop or (lambda: False)
         try:
-            renderer = self.plain if display.before else self.renderer(shown, True, giving_up(stopping))
+            renderer = (
+                self.plain if display.before else self.renderer(shown, True, cancellation_check(stopping))
+            )
         except GivenUpError:
             return None
         return self._frame(task, renderer, stopping)
@@ -195,7 +199,7 @@ class RendererCache:
         """Sampling distance of a moving image, voxels: the size of a pixel in the middle of the field."""
         distance = float(np.linalg.norm(camera.origin - self._middle))
         shown = distance / camera.fx / self.scene.field.sample_spacing
-        return min(max(shown, least), LONGEST_STEP)
+        return min(max(shown, least), MAX_STEP_VOXELS)
 
 
 def _lattice_bytes(edit: Edit) -> int:

@@ -14,7 +14,7 @@ from cagefield.errors import CagefieldError, line_of, warnings_in_one_line
 from cagefield.server.render_worker.parent_watch import end_with_parent
 
 
-async def in_own_process(work: Callable[..., Any], *args: Any) -> Any:
+async def run_in_process(work: Callable[..., Any], *args: Any) -> Any:
     """Result of `work(*args)`, run in a process of its own; work, arguments and result must be picklable.
 
     Cancellation ends the process. Raises CagefieldError: the error of the work, or the loss of the process.

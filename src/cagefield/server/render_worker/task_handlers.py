@@ -11,13 +11,13 @@ from cagefield.edits import Edit
 from cagefield.fields.splat_field import SplatField
 from cagefield.rendering.splats.raster_splats import deformed_splats
 from cagefield.server.editor.cage_placement import probes
-from cagefield.server.render_worker.cancellation import GivenUpError, giving_up
+from cagefield.server.render_worker.cancellation import GivenUpError, cancellation_check
 from cagefield.server.render_worker.encoding import picture_of, png
 from cagefield.server.render_worker.grid_lines import grid_lines
 from cagefield.server.render_worker.job_files import JobFiles
 from cagefield.server.render_worker.page_files import PageFiles
 from cagefield.server.render_worker.renderer_cache import RendererCache
-from cagefield.server.render_worker.splat_density import dense
+from cagefield.server.render_worker.splat_density import dense_cells
 from cagefield.server.render_worker.tasks import (
     Answered,
     EndJobTask,
@@ -38,7 +38,7 @@ from cagefield.server.render_worker.tasks import (
 )
 from cagefield.server.render_worker.view import Display
 
-DENSE = 0.05
+DENSE_VOXEL_OPACITY = 0.05
 """Optical depth of a voxel from which on it counts as dense."""
 
 SAMPLES = 2_000
@@ -97,7 +97,7 @@ class TaskHandlers:
             return Answered(task.number, (0.0, 0.0))
         try:
             (edit,) = self._renderers.edits((task.edit,))
-            most, mean = edit.lattice_error(samples=SAMPLES, proceed=giving_up(stop))
+            most, mean = edit.lattice_error(samples=SAMPLES, proceed=cancellation_check(stop))
         except GivenUpError:
             return Stopped(task.number)
         voxel = self._renderers.scene.field.sample_spacing
@@ -144,13 +144,13 @@ class TaskHandlers:
             below = self._renderers.edits(task.shown.edits)
             edits = self._renderers.scene.patcher.prepare(below, moving=True, preserve_opacity=False)
         if isinstance(field, SplatField):
-            return dense(task.cage, deformed_splats(field, edits)).tolist()
+            return dense_cells(task.cage, deformed_splats(field, edits)).tolist()
         from cagefield.rendering.edited_field import EditedField
 
         points = probes(task.cage).astype(np.float32)
         edited = EditedField(field, edits, field.bounds, preserve_opacity=False)
         sigma, _ = edited(points, np.tile(np.array([1.0, 0.0, 0.0], np.float32), (len(points), 1)))
-        return (sigma * field.sample_spacing > DENSE).tolist()
+        return (sigma * field.sample_spacing > DENSE_VOXEL_OPACITY).tolist()
 
     def _look(self, task: LookTask) -> tuple[list[list[float]], list[float], list[float]]:
         """(box, up direction) of the content to paste, and this scene's up direction."""

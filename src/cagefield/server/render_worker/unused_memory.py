@@ -11,7 +11,7 @@ import ctypes
 import sys
 import time
 
-EVERY = 10.0
+RETURN_INTERVAL_SECONDS = 10.0
 """Seconds between two times: each takes milliseconds."""
 
 
@@ -23,18 +23,19 @@ class UnusedMemory:
         self._last = time.monotonic()
 
     def give_back(self) -> bool:
-        """Whether it was given back: not where that was less than `EVERY` seconds ago, or cannot be done."""
+        """Return freed memory; False within RETURN_INTERVAL_SECONDS of the last time, or where it cannot be
+        done."""
         now = time.monotonic()
-        if self._trim is None or now - self._last < EVERY:
+        if self._trim is None or now - self._last < RETURN_INTERVAL_SECONDS:
             return False
         self._trim(0)
         self._last = now
         return True
 
 
-async def giving_back() -> None:
+async def return_memory_periodically() -> None:
     """Periodic return of freed memory in an event loop, until cancelled."""
     unused = UnusedMemory()
     while True:
-        await asyncio.sleep(EVERY)
+        await asyncio.sleep(RETURN_INTERVAL_SECONDS)
         unused.give_back()

@@ -23,11 +23,11 @@ from cagefield.server.protocol import server_messages
 from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.render_queue.dispatcher import TooManyError
 from cagefield.server.render_worker.tasks import PageFieldTask, StillTask
-from cagefield.server.render_worker.unused_memory import giving_back
+from cagefield.server.render_worker.unused_memory import return_memory_periodically
 from cagefield.server.web.security import Attempts, Guard
 from cagefield.server.web.uploads import OpenEditor, Reopen, TooLargeError
-from cagefield.server.web.websocket import attend
-from cagefield.server.web.worker_threads import all_started
+from cagefield.server.web.websocket import serve_page
+from cagefield.server.web.worker_threads import start_all_threads
 
 STATIC = Path(__file__).parent / "static"
 """The page as it was built."""
@@ -66,8 +66,8 @@ def application(
 
     @contextlib.asynccontextmanager
     async def life(_: Starlette) -> AsyncIterator[None]:
-        asyncio.get_running_loop().set_default_executor(all_started())
-        trimming = asyncio.create_task(giving_back())
+        asyncio.get_running_loop().set_default_executor(start_all_threads())
+        trimming = asyncio.create_task(return_memory_periodically())
         try:
             editor.start()
             yield
@@ -77,7 +77,7 @@ def application(
 
     async def socket(websocket: WebSocket) -> None:
         may_edit = websocket.scope["cagefield.role"] == "edit"
-        await attend(websocket, editor.coordinator, editor.hello, may_edit)
+        await serve_page(websocket, editor.coordinator, editor.hello, may_edit)
 
     async def edits(_: Request) -> Response:
         coordinator = editor.coordinator

@@ -11,9 +11,9 @@ import numpy as np
 from cagefield.edits import EditStack, dump_edits
 from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage
-from cagefield.server.editor.cage_placement import fitted
+from cagefield.server.editor.cage_placement import fit_to_content
 from cagefield.server.editor.edit_texts import read_edits
-from cagefield.server.editor.pasting import pasted
+from cagefield.server.editor.pasting import build_paste
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import client_messages, common, server_messages
 from cagefield.server.protocol.conversion import (
@@ -28,7 +28,7 @@ from cagefield.server.protocol.conversion import (
 from cagefield.server.render_queue.coordinator import Coordinator, Page
 from cagefield.server.render_worker.tasks import FitTask, GridTask, LookTask, Shown, SurfaceTask, values_of
 from cagefield.server.render_worker.view import Display
-from cagefield.server.web.worker_threads import in_thread
+from cagefield.server.web.worker_threads import run_in_thread
 from cagefield.typing import Array
 
 Handler = Callable[[Any, Any], "Coroutine[Any, Any, None] | None"]
@@ -250,7 +250,7 @@ class MessageHandlers:
         path = self._coordinator.store.source_of(message.source)
         box, up, own_up = await self._coordinator.ask(lambda number: LookTask(number, str(path)))
         point, height = await self._seen(0.5, 0.5, anywhere=True)
-        edit = pasted(
+        edit = build_paste(
             str(path), path.stem[:100], np.array(box), np.array(up), point, np.array(own_up), height
         )
         self._session.paste(edit)
@@ -263,7 +263,7 @@ class MessageHandlers:
         below = Shown(values_of(self._session.below(message.edit)))
         dense = await self._coordinator.ask(lambda number: FitTask(number, below, cage, edit.source))
         if self._session.document.entry(message.edit).edit.inner == cage:
-            self._session.fit_inner(message.edit, fitted(cage, np.array(dense)))
+            self._session.fit_inner(message.edit, fit_to_content(cage, np.array(dense)))
         self._coordinator.changed()
 
     @_handles(client_messages.OuterMargin)
@@ -326,7 +326,7 @@ class MessageHandlers:
     @_handles(client_messages.LoadEdits)
     async def _load_edits(self, message: client_messages.LoadEdits) -> None:
         store = self._coordinator.store
-        read = await in_thread(lambda: read_edits(message.text, store.admitted))
+        read = await run_in_thread(lambda: read_edits(message.text, store.admitted))
         store.remember(read)
         self._session.take_edits(read, message.append)
         self._coordinator.changed()

@@ -19,7 +19,7 @@ from cagefield.cameras.camera import Camera
 from cagefield.cameras.camera_paths import shared_up
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
-from cagefield.files.safe_open import MOST_TEXT, FileState, check_regular, read_text, real_path
+from cagefield.files.safe_open import MAX_TEXT_BYTES, FileState, check_regular, read_text, real_path
 from cagefield.formats.splats.detection import LOD_META, META, is_splat_folder
 from cagefield.pages.page_field import VERSION as FIELD_VERSION
 from cagefield.scene.scene import Scene
@@ -189,7 +189,7 @@ class Certificate:
 
         try:
             for file in (self.file, self.key or self.file):
-                check_regular(file, MOST_TEXT)
+                check_regular(file, MAX_TEXT_BYTES)
             ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(self.file, self.key, no_password)
         except ssl.SSLError as error:
             raise CagefieldError(
@@ -222,7 +222,7 @@ def serve(
         h11_max_incomplete_event_size=MAX_REQUEST_HEAD_BYTES,
         limit_concurrency=MAX_CONNECTIONS,
         ws="websockets-sansio",  # reads a page's next message once the last one was taken
-        ws_max_size=common.MOST_BYTES,
+        ws_max_size=common.MAX_MESSAGE_BYTES,
         ws_per_message_deflate=False,
         ssl_certfile=None if certificate is None else certificate.file,
         ssl_keyfile=None if certificate is None else certificate.key,

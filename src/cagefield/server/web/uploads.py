@@ -12,16 +12,16 @@ from cagefield.errors import CagefieldError
 from cagefield.files.temporary_folders import TemporaryFolder
 from cagefield.server.protocol import server_messages
 from cagefield.server.render_queue.coordinator import Coordinator
-from cagefield.server.render_worker.subprocess_task import in_own_process
+from cagefield.server.render_worker.subprocess_task import run_in_process
 from cagefield.server.web.splat_file_scene import scene_of_file
 
-MOST_UPLOAD = 4 << 30
+MAX_UPLOAD_BYTES = 4 << 30
 """Largest file in bytes that a page may send: 17 million splats with harmonics of degree 3 as a PLY."""
 
-STALLED = 30.0
+STALL_TIMEOUT_SECONDS = 30.0
 """Seconds without a byte of a file that a page sends, after which it is given up."""
 
-MOST_NAME = 200
+MAX_NAME_BYTES = 200
 """Bytes of the name of a file that a page sends: systems take 255, some with encryption 143."""
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
@@ -32,7 +32,7 @@ Reopen = Callable[[Path, Path], Opened]
 
 
 class TooLargeError(CagefieldError):
-    """A file larger than MOST_UPLOAD."""
+    """A file larger than MAX_UPLOAD_BYTES."""
 
 
 class OpenEditor:
@@ -54,7 +54,7 @@ class OpenEditor:
         Unsaved changes stay in the autosave of the scene edited before.
 
         Raises:
-            TooLargeError: more than MOST_UPLOAD bytes.
+            TooLargeError: more than MAX_UPLOAD_BYTES bytes.
             CagefieldError: another file is being opened, a name that is none, a file without splats.
         """
         if self._reopen is None:
@@ -66,7 +66,7 @@ class OpenEditor:
             with TemporaryFolder("open", tidy=False) as folder:
                 try:
                     await _receive(folder / file_name, content, size)
-                    scene = await in_own_process(scene_of_file, folder / file_name)
+                    scene = await run_in_process(scene_of_file, folder / file_name)
                 except CagefieldError as error:
                     raise type(error)(str(error).replace(f"{folder}{os.sep}", "")) from None
             await self._enter(
@@ -95,9 +95,9 @@ def _file_name(name: str) -> str:
     if not last or last.startswith(".") or _CONTROL.search(last):
         raise CagefieldError(f"{name!r:.80} is no name of a file; give the file its name, such as x.ply")
     size = len(last.encode())
-    if size > MOST_NAME:
+    if size > MAX_NAME_BYTES:
         raise CagefieldError(
-            f"the name {last[:40]}... has {size} bytes, at most {MOST_NAME}; rename the file"
+            f"the name {last[:40]}... has {size} bytes, at most {MAX_NAME_BYTES}; rename the file"
         )
     return last
 
@@ -105,21 +105,21 @@ def _file_name(name: str) -> str:
 async def _receive(file: Path, content: AsyncIterator[bytes], size: int | None) -> None:
     """Write the received bytes to a file. Raises TooLargeError, and CagefieldError for an incomplete
     upload."""
-    if size is not None and size > MOST_UPLOAD:
+    if size is not None and size > MAX_UPLOAD_BYTES:
         raise TooLargeError(_too_large(size))
     received, blocks = 0, content.__aiter__()
     with file.open("wb") as stream:
         while True:
             try:
-                block = await asyncio.wait_for(blocks.__anext__(), STALLED)
+                block = await asyncio.wait_for(blocks.__anext__(), STALL_TIMEOUT_SECONDS)
             except StopAsyncIteration:
                 break
             except (TimeoutError, asyncio.TimeoutError):
                 raise CagefieldError(
-                    f"{file.name}: nothing more came for {STALLED:g} s; send it again"
+                    f"{file.name}: nothing more came for {STALL_TIMEOUT_SECONDS:g} s; send it again"
                 ) from None
             received += len(block)
-            if received > MOST_UPLOAD:
+            if received > MAX_UPLOAD_BYTES:
                 raise TooLargeError(_too_large(received))
             await asyncio.to_thread(stream.write, block)
     if size is not None and received != size:
@@ -128,6 +128,6 @@ async def _receive(file: Path, content: AsyncIterator[bytes], size: int | None) 
 
 def _too_large(size: int) -> str:
     return (
-        f"the file has {size / 1e9:.1f} GB or more, a page may send {MOST_UPLOAD / 1e9:.1f}; "
+        f"the file has {size / 1e9:.1f} GB or more, a page may send {MAX_UPLOAD_BYTES / 1e9:.1f}; "
         "open it with `cagefield view FILE`"
     )

@@ -25,7 +25,7 @@ from cagefield.server.web.security import Allowance
 TOO_BIG, TOO_MANY, COME_AGAIN, TRY_LATER = 1009, 1008, 1012, 1013
 """Close codes of RFC 6455 and its registry: too big, policy violation, service restart, try again later."""
 
-MOST_PAGES = 64
+MAX_PAGES = 64
 """Open pages of an editor."""
 
 TO_TAKE = 60.0
@@ -39,7 +39,7 @@ BYTES_PER_SECOND = 4 << 20
 
 _log = logging.getLogger(__name__)
 
-MOST_REFUSED = 2000
+MAX_REFUSED_MESSAGES = 2000
 """Messages over the rate after which the socket is closed."""
 
 
@@ -63,13 +63,13 @@ class _Turns:
 _turns: WeakKeyDictionary[asyncio.AbstractEventLoop, _Turns] = WeakKeyDictionary()
 
 
-async def attend(
+async def serve_page(
     socket: WebSocket, coordinator: Coordinator, hello: server_messages.Hello, may_edit: bool = True
 ) -> None:
     """Serves one page until it is gone; one that may not edit may look."""
     try:
         await socket.accept()
-        if len(coordinator.pages) >= MOST_PAGES:
+        if len(coordinator.pages) >= MAX_PAGES:
             await socket.close(TRY_LATER, "too many pages are open; close some")
             return
     except (WebSocketDisconnect, ConnectionError):
@@ -113,7 +113,7 @@ async def _read(socket: WebSocket, page: Page, receive_queue: ReceiveQueue) -> N
             return
         text = received.get("text")
         size = len(received.get("bytes") or b"" if text is None else text.encode())
-        if size > common.MOST_BYTES:
+        if size > common.MAX_MESSAGE_BYTES:
             await socket.close(TOO_BIG, "message too big")
             return
         await turns.take()  # the line holds back what more comes
@@ -122,7 +122,7 @@ async def _read(socket: WebSocket, page: Page, receive_queue: ReceiveQueue) -> N
             refused += 1
             if refused == 1:
                 page.notice("error", "too many messages; some were passed over")
-            if refused > MOST_REFUSED:
+            if refused > MAX_REFUSED_MESSAGES:
                 await socket.close(TOO_MANY, "too many messages")
                 return
             continue

@@ -14,7 +14,7 @@ THREADS = 8
 """Threads that work at a time; more work waits: on disks, mostly, which are no faster with more of them."""
 
 
-def all_started(count: int = THREADS) -> ThreadPoolExecutor:
+def start_all_threads(count: int = THREADS) -> ThreadPoolExecutor:
     """Threads that have all begun, so that none more is there after hours, nor the memory that each keeps."""
     executor, met = ThreadPoolExecutor(count, thread_name_prefix="work"), threading.Barrier(count)
     try:
@@ -22,13 +22,13 @@ def all_started(count: int = THREADS) -> ThreadPoolExecutor:
     except RuntimeError:  # the system allows no more
         met.abort()
         executor.shutdown()
-        return all_started(count // 2) if count > 1 else ThreadPoolExecutor(1)
+        return start_all_threads(count // 2) if count > 1 else ThreadPoolExecutor(1)
     for each in waiting:
         each.result()
     return executor
 
 
-async def in_thread(work: Callable[[], T]) -> T:
+async def run_in_thread(work: Callable[[], T]) -> T:
     """Result of `work`, run in a worker thread. A cancelled caller still waits for its end, as its lock is
     held so long."""
     working = asyncio.get_running_loop().run_in_executor(None, work)
