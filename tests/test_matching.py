@@ -41,7 +41,7 @@ def matched(extracted, folder, **options):
         **options,
     )
     assert shares == sorted(shares) and shares[-1] == 1.0
-    with features.quiet(), contextlib.closing(pycolmap.Database.open(copy)) as opened:
+    with features.silence_log(), contextlib.closing(pycolmap.Database.open(copy)) as opened:
         geometries = opened.read_two_view_geometries()
         return dict(zip(*opened.read_all_matches(), strict=True)), dict(zip(*geometries, strict=True))
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from cagefield.errors import CagefieldError
-from cagefield.images.metrics import color_corrected, color_fit, gradient_ratio, mse, psnr, ssim
+from cagefield.images.metrics import correct_colors, fit_colors, gradient_ratio, mse, psnr, ssim
 
 
 def pair(shape: tuple[int, ...], noise: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -86,17 +86,17 @@ def test_color_correction_undoes_an_affine_change_of_each_channel():
     photo = 0.1 + 0.6 * photo
     gain, offset = np.array([0.8, 1.2, 0.9]), np.array([0.05, -0.08, 0.02])
     picture = (photo - offset) / gain
-    fit = color_fit(picture, photo)
+    fit = fit_colors(picture, photo)
     np.testing.assert_allclose(fit.gain, gain, rtol=1e-9)
     np.testing.assert_allclose(fit.offset, offset, atol=1e-9)
     # the picture itself is float32
-    np.testing.assert_allclose(color_corrected(picture, photo), photo, atol=1e-6)
+    np.testing.assert_allclose(correct_colors(picture, photo), photo, atol=1e-6)
 
 
 def test_color_correction_is_the_regression_of_the_photo_on_the_picture():
     picture, photo = pair((40, 40, 3), 0.05)
     picture, photo = 0.2 + 0.5 * picture, 0.2 + 0.5 * photo
-    fit = color_fit(picture, photo)
+    fit = fit_colors(picture, photo)
     for channel in range(3):
         slope, offset = np.polyfit(picture[..., channel].ravel(), photo[..., channel].ravel(), 1)
         assert (fit.gain[channel], fit.offset[channel]) == pytest.approx((slope, offset), abs=1e-9)
@@ -105,7 +105,7 @@ def test_color_correction_is_the_regression_of_the_photo_on_the_picture():
 def test_saturated_pixels_take_no_part_in_the_color_fit_and_the_result_is_clipped():
     truth = np.repeat(np.linspace(0.0, 1.0, 400).reshape(20, 20, 1), 3, 2)
     photo = np.clip(1.5 * truth, 0, 1)
-    fit = color_fit(truth, photo)
+    fit = fit_colors(truth, photo)
     np.testing.assert_allclose(fit.gain, 1.5, rtol=1e-9)
     np.testing.assert_allclose(fit.offset, 0.0, atol=1e-9)
     np.testing.assert_allclose(fit(truth), photo, atol=1e-6)
@@ -114,7 +114,7 @@ def test_saturated_pixels_take_no_part_in_the_color_fit_and_the_result_is_clippe
 def test_a_channel_of_one_value_gets_an_offset_and_a_saturated_one_stays():
     picture, photo = np.full((12, 12, 3), 0.4), np.full((12, 12, 3), 0.5)
     picture[..., 2] = 0.0
-    np.testing.assert_allclose(color_corrected(picture, photo)[0, 0], [0.5, 0.5, 0.0], atol=1e-7)
+    np.testing.assert_allclose(correct_colors(picture, photo)[0, 0], [0.5, 0.5, 0.0], atol=1e-7)
 
 
 def test_excluded_pixels_have_no_part_in_any_figure():
@@ -127,7 +127,7 @@ def test_excluded_pixels_have_no_part_in_any_figure():
     assert psnr(c, d, valid) == psnr(a, b, valid) != psnr(a, b)
     # windows across the mask's border add up in another order
     assert ssim(c, d, valid) == pytest.approx(ssim(a, b, valid), abs=1e-12)
-    np.testing.assert_array_equal(color_fit(c, d, valid).gain, color_fit(a, b, valid).gain)
+    np.testing.assert_array_equal(fit_colors(c, d, valid).gain, fit_colors(a, b, valid).gain)
     assert ssim(a, b, np.ones((24, 26), bool)) == ssim(a, b)
 
 

@@ -109,12 +109,12 @@ def test_the_error_of_what_stands_still_is_that_of_the_pixels():
 @pytest.fixture
 def database(tmp_path):
     """A COLMAP database of three photos; the first two features of each are on something that moves."""
-    pycolmap = features.engine()
+    pycolmap = features.import_pycolmap()
     path = tmp_path / "database.db"
     camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=400, height=300, params=[400, 200, 150])
     features.create_database(path, [camera], [features.Photo(f"{n}.png", 0) for n in range(3)])
     rows = np.repeat(np.arange(MIN_STATIC_MATCHES + 2, dtype=np.uint32)[:, None], 2, axis=1)
-    with features.opened(path) as source:
+    with features.open_database(path) as source:
         for n in range(3):
             keypoints = np.random.default_rng(n).uniform(0, 300, (len(rows), 2)).astype(np.float32)
             source.write_keypoints(n + 1, keypoints)
@@ -132,7 +132,7 @@ def test_matches_of_moving_features_leave_the_database(database):
     assert remove_features(database, moving) == [(0, 1)], "(1, 2) has lost none, (0, 2) has too few left"
     left = read_features(database, 3).matches
     assert list(left) == [(1, 2)] and len(left[1, 2]) == MIN_STATIC_MATCHES
-    with features.opened(database) as source:
+    with features.open_database(database) as source:
         assert np.asarray(source.read_matches(1, 2)).min() == 2 and not source.exists_matches(1, 3)
 
 

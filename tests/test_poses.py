@@ -193,11 +193,11 @@ def test_ctrl_c_ends_a_call_of_pycolmap_s_and_waits_for_its_end():
     try:
         threading.Timer(0.5, signal.raise_signal, [signal.SIGINT]).start()
         with pytest.raises(KeyboardInterrupt):
-            features.call(endless)
+            features.call_cancellable(endless)
     finally:
         signal.signal(signal.SIGINT, before)
     assert order == ["ended"]
-    assert features.engine().logging.minloglevel == 0
+    assert features.import_pycolmap().logging.minloglevel == 0
 
 
 def test_a_failure_of_colmap_s_is_one_line(tmp_path):
@@ -205,7 +205,7 @@ def test_a_failure_of_colmap_s_is_one_line(tmp_path):
         raise RuntimeError("[file.cc:12] Check failed:\n  a == b")
 
     with pytest.raises(DatasetError, match=r"COLMAP stopped at fails: \[file.cc:12\] Check failed: a == b"):
-        features.call(fails)
+        features.call_cancellable(fails)
 
 
 def test_the_work_of_other_photos_is_not_used(photos, tmp_path):
@@ -297,7 +297,7 @@ def test_photos_of_one_size_and_focal_length_share_a_camera(tmp_path):
 
 def test_many_photos_are_matched_with_neighbours_and_with_those_alike(photos, tmp_path):
     names = sorted(file.name for file in photos.glob("0*.png"))  # eight of them, in the order of the ring
-    camera = features.engine().Camera(
+    camera = features.import_pycolmap().Camera(
         model="SIMPLE_PINHOLE", width=WIDTH, height=HEIGHT, params=[440, 200, 150]
     )
     database = tmp_path / "database.db"

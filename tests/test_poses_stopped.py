@@ -71,13 +71,13 @@ def test_one_that_fails_ends_the_others(tmp_path: Path, monkeypatch: pytest.Monk
         f"while [ ! -e {tmp_path}/begun ]; do sleep 0.1; done; exit 5", monkeypatch
     )  # fmt: skip
     with pytest.raises(StoppedError, match="work stopped with status 5"):
-        colmap_process.run("work", [{"task": "slow"}, {"task": "quick"}], lambda done: None)
+        colmap_process.run_tasks("work", [{"task": "slow"}, {"task": "quick"}], lambda done: None)
 
 
 def test_what_processes_have_done_is_summed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _instead_of_python(tmp_path, "echo done 1; echo COLMAP says done; echo done 4", monkeypatch)
     seen: list[int] = []
-    colmap_process.run("work", [{}, {}], seen.append)
+    colmap_process.run_tasks("work", [{}, {}], seen.append)
     assert seen[-1] == 8
 
 
@@ -330,26 +330,26 @@ def test_a_model_that_is_cut_off_replaces_nothing(tmp_path: Path, monkeypatch: p
 def test_a_database_that_fails_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "d.db").write_bytes(b"no database" * 99)
     failing = r"^COLMAP stopped at its database .*d\.db: .*$"
-    with pytest.raises(StoppedError, match=failing) as caught, features.opened(tmp_path / "d.db"):
+    with pytest.raises(StoppedError, match=failing) as caught, features.open_database(tmp_path / "d.db"):
         pass
     assert "free on its disk" not in str(caught.value)
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=4096))
     told = r", and 4 kB are free on its disk$"
-    with pytest.raises(StoppedError, match=told), features.opened(tmp_path / "d.db"):
+    with pytest.raises(StoppedError, match=told), features.open_database(tmp_path / "d.db"):
         pass
-    with pytest.raises(DatasetError, match=r"^mine$"), features.opened(tmp_path / "e.db"):
+    with pytest.raises(DatasetError, match=r"^mine$"), features.open_database(tmp_path / "e.db"):
         raise DatasetError("mine")
 
 
 def test_a_database_whose_journal_stays_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """SQLite closes it without a word where the disk is full; without its journal it is empty."""
-    opened = features.opened
+    opened = features.open_database
 
     def journalled(path: Path) -> Any:
         path.with_name(path.name + "-wal").write_bytes(b"rows")
         return opened(path.with_name("other.db"))
 
-    monkeypatch.setattr(features, "opened", journalled)
+    monkeypatch.setattr(features, "open_database", journalled)
     with pytest.raises(OSError, match="No space left"):
         features.create_database(tmp_path / "d.db", [], [])
     assert not (tmp_path / "d.db").exists()

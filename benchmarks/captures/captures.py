@@ -26,7 +26,7 @@ from cagefield.datasets.views import SparsePoints
 from cagefield.errors import CagefieldError
 from cagefield.files.npz import read_array
 from cagefield.images.image_files import side_by_side, write_png
-from cagefield.images.metrics import color_corrected
+from cagefield.images.metrics import correct_colors
 from cagefield.images.render_result import RenderResult
 from cagefield.training.evaluation import (
     Evaluation,
@@ -307,7 +307,7 @@ def write_pictures(
     written = []
     for view in dataset.test[:: -(-len(dataset.test) // views)]:
         photo, frame = composite_on_white(view.load()), learnt.show(view.camera)
-        picture = color_corrected(np.clip(frame.rgb, 0, 1), photo, view.valid_pixels())
+        picture = correct_colors(np.clip(frame.rgb, 0, 1), photo, view.valid_pixels())
         difference = 1 - np.minimum(times * np.abs(picture - photo).max(-1, keepdims=True), 1)
         known = true_depth(dataset, view)
         panels = [photo, picture, np.repeat(difference, 3, -1), _grey(frame.depth, known)]

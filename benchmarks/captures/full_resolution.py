@@ -23,7 +23,7 @@ from benchmarks.common.tables import Table, number, write_text
 from cagefield.cameras.camera import Camera
 from cagefield.datasets import View, load_dataset
 from cagefield.errors import CagefieldError
-from cagefield.images.metrics import color_corrected, gradient_ratio
+from cagefield.images.metrics import correct_colors, gradient_ratio
 from cagefield.scene.scene import Scene
 from cagefield.training.evaluation import Evaluation, ViewMetrics, composite_on_white, evaluate_image
 from cagefield.typing import Float32
@@ -95,7 +95,7 @@ def measure(
         figures = evaluate_image(view.name, picture, photo, valid)
         if figures is None:
             continue
-        fitted = color_corrected(picture, photo, valid)
+        fitted = correct_colors(picture, photo, valid)
         if valid is not None:
             photo = np.where(valid[..., None], photo, fitted)
         yield FullSizeFigures(

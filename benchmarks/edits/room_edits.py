@@ -24,7 +24,7 @@ from cagefield.cameras.camera import Camera
 from cagefield.datasets import Dataset
 from cagefield.errors import CagefieldError
 from cagefield.images.image_files import side_by_side, write_png
-from cagefield.images.metrics import color_fit
+from cagefield.images.metrics import fit_colors
 from cagefield.procedural import capture
 from cagefield.procedural.hand_held import render_image
 from cagefield.typing import Float32
@@ -54,7 +54,7 @@ def measure(dataset: Dataset, learnt: Learnt, cases: Sequence[Case]) -> list[Roo
         truth = np.stack([_clipped(render_image(scene, camera)[0]) for camera in cameras])
         moved = np.stack([_clipped(render_image(_moved(case), camera)[0]) for camera in cameras])
         plain = [_clipped(learnt.show(camera).rgb) for camera in cameras]
-        fits = [color_fit(shown, true) for shown, true in zip(plain, truth, strict=True)]
+        fits = [fit_colors(shown, true) for shown, true in zip(plain, truth, strict=True)]
         after = [fit(_clipped(edited(camera).rgb)) for camera, fit in zip(cameras, fits, strict=True)]
         before = [fit(shown) for shown, fit in zip(plain, fits, strict=True)]
         figures = compare(np.stack(before), np.stack(after), truth, moved)
@@ -128,7 +128,7 @@ def write_picture(learnt: Learnt, case: Case, folder: Path, size: int = 480) -> 
     eye, target = _EYES[case.scene]
     camera = Camera.look_at(eye, target, width=round(0.75 * size), height=size, fov_x=float(np.radians(52.0)))
     before, after = (_clipped(show(camera).rgb) for show in (learnt.show, learnt.edited(case.edits)))
-    fit = color_fit(before, _clipped(render_image(capture(case.scene).scene, camera)[0]))
+    fit = fit_colors(before, _clipped(render_image(capture(case.scene).scene, camera)[0]))
     truth = _clipped(render_image(moved, camera)[0])
     path = folder / case.file.replace(".yaml", ".png")
     write_png(path, side_by_side(fit(before), fit(after), truth))

@@ -106,7 +106,7 @@ def _make_database(count: int, folder: Path) -> None:
 
     features.create_database(folder / "database.db", *_cameras_and_photos())
     chance, pairs = np.random.default_rng(0), np.stack([np.arange(count, dtype=np.uint32)] * 2, axis=1)
-    with features.opened(folder / "database.db") as database:
+    with features.open_database(folder / "database.db") as database:
         for n in range(1, 4):
             database.write_keypoints(n, chance.uniform(0, 16, (count, 4)).astype(np.float32))
             kinds = pycolmap.FeatureExtractorType.SIFT

@@ -134,7 +134,7 @@ def stills(keys: Sequence[Keyframe], *, loop: bool, fps: float, width: int, heig
     if not keys:
         raise CameraError("a camera path needs at least one keyframe; record one")
     if len(keys) == 1:
-        return (_still(keys[0].pose, keys[0].fov_y_deg, dict(keys[0].parts), width, height),)
+        return (_build_still(keys[0].pose, keys[0].fov_y_deg, dict(keys[0].parts), width, height),)
     timeline = Timeline(keys, loop=loop)
     count = max(2, round(timeline.seconds * fps) + (0 if loop else 1))
     if count > 100_000:
@@ -142,7 +142,7 @@ def stills(keys: Sequence[Keyframe], *, loop: bool, fps: float, width: int, heig
     times = np.linspace(0.0, timeline.seconds, count, endpoint=not loop)
     poses, fovs, parts = timeline.poses(times), timeline.fovs_y_deg(times), timeline.parts(times)
     return tuple(
-        _still(
+        _build_still(
             poses[n],
             float(fovs[n]),
             {name: float(values[n]) for name, values in parts.items()},
@@ -164,6 +164,6 @@ def _rotation_spline(matrices: list[Floats], times: Floats, loop: bool) -> Rotat
     )
 
 
-def _still(pose: Floats, fov_y_deg: float, parts: dict[int, float], width: int, height: int) -> Still:
+def _build_still(pose: Floats, fov_y_deg: float, parts: dict[int, float], width: int, height: int) -> Still:
     focal = 0.5 * height / math.tan(0.5 * math.radians(fov_y_deg))
     return Still(Camera(pose, width, height, focal, focal, 0.5 * width, 0.5 * height), parts)

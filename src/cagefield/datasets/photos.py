@@ -101,7 +101,7 @@ def read_photo(path: Path, factor: int = 1) -> npt.NDArray[np.uint8]:
             load_pixels(image)
             for box in iterate_tiles(width * factor, height * factor, factor):
                 x, y, end_x, end_y = (side // factor for side in box)
-                pixels[y:end_y, x:end_x] = _shrunk(convert(image.crop(box)), factor)
+                pixels[y:end_y, x:end_x] = _shrink_pixels(convert(image.crop(box)), factor)
         except DECODING_ERRORS as error:
             cure = "convert it to JPEG" if image.format in EFFICIENT_FORMATS else "replace the file"
             raise DatasetError(
@@ -110,7 +110,7 @@ def read_photo(path: Path, factor: int = 1) -> npt.NDArray[np.uint8]:
     return pixels
 
 
-def _shrunk(pixels: Image.Image, factor: int) -> npt.NDArray[np.uint8]:
+def _shrink_pixels(pixels: Image.Image, factor: int) -> npt.NDArray[np.uint8]:
     """Means of `factor` x `factor` pixels of a part of a photo, whose sides are multiples of `factor`.
 
     Memory: 40 bytes for each pixel of the part.

@@ -22,7 +22,7 @@ MAX_COLOR_FITS = 5
 """Maximum number of fits of a color correction, each without the pixels that the fit before saturates."""
 
 
-def _pair(first: AnyArray, second: AnyArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _to_float_pair(first: AnyArray, second: AnyArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     first, second = np.asarray(first), np.asarray(second)
     if first.shape != second.shape or first.size == 0:
         raise CagefieldError(
@@ -32,7 +32,7 @@ def _pair(first: AnyArray, second: AnyArray) -> tuple[NDArray[np.float64], NDArr
     return floats[0], floats[1]
 
 
-def _checked_mask(valid: Mask | None, shape: tuple[int, ...]) -> Mask | None:
+def _validate_mask(valid: Mask | None, shape: tuple[int, ...]) -> Mask | None:
     """Mask [H,W], None where every pixel of images [H,W] or [H,W,C] is valid.
 
     Raises CagefieldError for a mask of another size, and for one without a valid pixel.
@@ -51,8 +51,8 @@ def _checked_mask(valid: Mask | None, shape: tuple[int, ...]) -> Mask | None:
 
 def mse(first: AnyArray, second: AnyArray, valid: Mask | None = None) -> float:
     """Mean squared difference over all channels of all pixels, or of those of a mask [H,W]."""
-    a, b = _pair(first, second)
-    chosen = _checked_mask(valid, a.shape)
+    a, b = _to_float_pair(first, second)
+    chosen = _validate_mask(valid, a.shape)
     square = (a - b) ** 2
     return float(np.mean(square if chosen is None else square[chosen]))
 
@@ -73,7 +73,7 @@ def ssim(first: AnyArray, second: AnyArray, valid: Mask | None = None) -> float:
     Source: Wang et al., "Image quality assessment: from error visibility to structural similarity" (2004),
     equations 13 to 16, and the authors' ssim_index.
     """
-    a, b = _pair(first, second)
+    a, b = _to_float_pair(first, second)
     if a.ndim not in (2, 3) or min(a.shape[:2]) < SSIM_WINDOW_PIXELS:
         raise CagefieldError(
             f"ssim needs images of at least {SSIM_WINDOW_PIXELS}x{SSIM_WINDOW_PIXELS} pixels, not "
@@ -83,7 +83,7 @@ def ssim(first: AnyArray, second: AnyArray, valid: Mask | None = None) -> float:
     kernel = np.exp(-0.5 * (offsets / SSIM_SIGMA_PIXELS) ** 2)
     kernel /= kernel.sum()
     edge = SSIM_WINDOW_PIXELS // 2
-    valid = _checked_mask(valid, a.shape)
+    valid = _validate_mask(valid, a.shape)
 
     def inner(image: NDArray[Any]) -> NDArray[Any]:
         return image[edge:-edge, edge:-edge]
@@ -122,8 +122,8 @@ def gradient_ratio(image: AnyArray, photo: AnyArray, valid: Mask | None = None) 
     Gradients are central differences of the mean over channels; pixels beside excluded ones are left out. NaN
     where the photo has no gradient.
     """
-    a, b = (pixels if pixels.ndim == 2 else pixels.mean(axis=-1) for pixels in _pair(image, photo))
-    chosen = _checked_mask(valid, a.shape)
+    a, b = (pixels if pixels.ndim == 2 else pixels.mean(axis=-1) for pixels in _to_float_pair(image, photo))
+    chosen = _validate_mask(valid, a.shape)
     inside: Any = slice(None) if chosen is None else binary_erosion(chosen, border_value=1)
     first, second = (float(np.hypot(*np.gradient(image))[inside].sum()) for image in (a, b))
     return first / second if second > 0 else float("nan")
@@ -138,11 +138,11 @@ class ColorFit:
 
     def __call__(self, image: AnyArray) -> NDArray[np.float32]:
         """Corrected image [H,W,C] in [0,1]."""
-        floats, _ = _pair(image, image)
+        floats, _ = _to_float_pair(image, image)
         return np.clip(floats * self.gain + self.offset, 0, 1).astype(np.float32)
 
 
-def color_fit(image: AnyArray, photo: AnyArray, valid: Mask | None = None) -> ColorFit:
+def fit_colors(image: AnyArray, photo: AnyArray, valid: Mask | None = None) -> ColorFit:
     """Least-squares affine map of each channel of an image [H,W,C] to a photo.
 
     The fit takes valid pixels that are saturated in neither image, nor by the map itself, and is repeated
@@ -150,15 +150,15 @@ def color_fit(image: AnyArray, photo: AnyArray, valid: Mask | None = None) -> Co
     offset alone; one without such pixels is unchanged. Source: `color_correct` of multinerf (evaluation of
     mip-NeRF 360), its quadratic terms left out.
     """
-    a, b = _pair(image, photo)
-    chosen = _checked_mask(valid, a.shape)
+    a, b = _to_float_pair(image, photo)
+    chosen = _validate_mask(valid, a.shape)
     a, b = (
         (a.reshape(-1, a.shape[-1]), b.reshape(-1, b.shape[-1])) if chosen is None else (a[chosen], b[chosen])
     )
     gain, offset = np.ones(a.shape[-1]), np.zeros(a.shape[-1])
     for channel in range(a.shape[-1]):
         x, y = a[:, channel], b[:, channel]
-        both = _unsaturated(x) & _unsaturated(y)
+        both = _is_unsaturated(x) & _is_unsaturated(y)
         used = both
         for _ in range(MAX_COLOR_FITS):
             if not used.any():
@@ -167,17 +167,17 @@ def color_fit(image: AnyArray, photo: AnyArray, valid: Mask | None = None) -> Co
             variance = ((x[used] - mean_x) ** 2).mean()
             slope = ((x[used] - mean_x) * (y[used] - mean_y)).mean() / variance if variance > 1e-12 else 1.0
             gain[channel], offset[channel] = slope, mean_y - slope * mean_x
-            before, used = used, both & _unsaturated(slope * x + offset[channel])
+            before, used = used, both & _is_unsaturated(slope * x + offset[channel])
             if np.array_equal(before, used):
                 break
     return ColorFit(gain, offset)
 
 
-def color_corrected(image: AnyArray, photo: AnyArray, valid: Mask | None = None) -> NDArray[np.float32]:
-    """Image [H,W,C] in the photo's colors: each channel by the affine map of `color_fit`."""
-    return color_fit(image, photo, valid)(image)
+def correct_colors(image: AnyArray, photo: AnyArray, valid: Mask | None = None) -> NDArray[np.float32]:
+    """Image [H,W,C] in the photo's colors: each channel by the affine map of `fit_colors`."""
+    return fit_colors(image, photo, valid)(image)
 
 
-def _unsaturated(values: NDArray[np.float64]) -> Mask:
+def _is_unsaturated(values: NDArray[np.float64]) -> Mask:
     inside: Mask = (values >= MAX_SATURATION_DISTANCE) & (values <= 1 - MAX_SATURATION_DISTANCE)
     return inside

@@ -186,12 +186,14 @@ def _write_colmap(tracks: Tracks, cameras: Sequence[Camera], names: Sequence[str
         x, y, z, w = Rotation.from_matrix(rotation).as_quat()
         shift = -rotation @ camera.origin
         lines.append(" ".join([str(index + 1), *(repr(float(v)) for v in (w, x, y, z, *shift)), "1", name]))
-        rows_of = np.flatnonzero(tracks.view == index)
-        row_in_image[rows_of] = np.arange(len(rows_of))
+        observation_rows = np.flatnonzero(tracks.view == index)
+        row_in_image[observation_rows] = np.arange(len(observation_rows))
         lines.append(
             " ".join(
                 f"{u:.3f} {v:.3f} {point + 1}"
-                for (u, v), point in zip(tracks.pixel[rows_of], tracks.point[rows_of], strict=True)
+                for (u, v), point in zip(
+                    tracks.pixel[observation_rows], tracks.point[observation_rows], strict=True
+                )
             )
         )
     (folder / "images.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -199,9 +201,10 @@ def _write_colmap(tracks: Tracks, cameras: Sequence[Camera], names: Sequence[str
     ends = np.searchsorted(tracks.point[order], np.arange(len(tracks) + 1))
     rows = []
     for index in range(len(tracks)):
-        rows_of = order[ends[index] : ends[index + 1]]
+        observation_rows = order[ends[index] : ends[index + 1]]
         track = " ".join(
-            f"{view + 1} {row}" for view, row in zip(tracks.view[rows_of], row_in_image[rows_of], strict=True)
+            f"{view + 1} {row}"
+            for view, row in zip(tracks.view[observation_rows], row_in_image[observation_rows], strict=True)
         )
         x, y, z = tracks.positions[index]
         r, g, b = tracks.rgb[index]

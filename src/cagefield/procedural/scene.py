@@ -52,7 +52,7 @@ class ProceduralScene:
                 f"part names must differ; {', '.join(duplicates)} is used twice in scene {self.name}"
             )
         if not self.modeled:
-            object.__setattr__(self, "modelled", self.parts)
+            object.__setattr__(self, "modeled", self.parts)
 
     @property
     def part_names(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cagefield.datasets.views import View
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.images.metrics import SSIM_WINDOW_PIXELS, color_corrected, psnr, ssim
+from cagefield.images.metrics import SSIM_WINDOW_PIXELS, correct_colors, psnr, ssim
 from cagefield.typing import AnyArray, Float32
 
 
@@ -89,7 +89,7 @@ def evaluate_image(
     return ViewMetrics(
         name,
         psnr(image, photo, valid),
-        psnr(color_corrected(image, photo, valid), photo, valid),
+        psnr(correct_colors(image, photo, valid), photo, valid),
         ssim(image, photo, valid) if fits else float("nan"),
     )
 

@@ -30,7 +30,7 @@ class StoppedError(DatasetError):
     """Failure of COLMAP, or of the system beneath it, for which the photos are not to blame."""
 
 
-def run(stage: str, tasks: Sequence[Mapping[str, Any]], on_done: Callable[[int], None]) -> None:
+def run_tasks(stage: str, tasks: Sequence[Mapping[str, Any]], on_done: Callable[[int], None]) -> None:
     """Run tasks of `colmap_tasks` in parallel, each in a process of its own.
 
     `on_done` is called several times a second with the sum of their progress. Raises StoppedError with the

@@ -57,7 +57,7 @@ def is_sequence(counts: Counts) -> bool:
 
 def remove_pairs(database: Path, pairs: set[tuple[int, int]]) -> None:
     """Remove the verified matches of pairs (i, j) from a database."""
-    with features.opened(database) as source:
+    with features.open_database(database) as source:
         for i, j in sorted(pairs):
             source.delete_two_view_geometry(i + 1, j + 1)
 
@@ -74,9 +74,9 @@ def relative_rotations(
     """Relative rotation R_j R_i^T [3,3] of the pairs whose photos are in the model `chain`, from their own
     matches alone.
     """
-    pycolmap = features.engine()
+    pycolmap = features.import_pycolmap()
     rotations = {}
-    with features.opened(database) as source:
+    with features.open_database(database) as source:
         registered = {number - 1 for number in chain.reg_image_ids()}
         used = {index for pair in pairs for index in pair} & registered
         keypoints = {i: np.asarray(source.read_keypoints(i + 1), dtype=np.float64)[:, :2] for i in used}

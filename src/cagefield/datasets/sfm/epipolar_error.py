@@ -156,16 +156,18 @@ def match_photos(views: Sequence[View], on_progress: OnProgress | None = None) -
     """
     ordered = sort_views(views)
     ordered = ordered[:: max(1, -(-len(ordered) // MAX_MEASURED_PHOTOS))]
-    pycolmap = features.engine()
+    pycolmap = features.import_pycolmap()
     options = pycolmap.FeatureExtractionOptions(use_gpu=False, num_threads=1)
     options.sift.max_num_features = MAX_MEASURED_FEATURES
     options.sift.first_octave = 0
-    with features.quiet():
+    with features.silence_log():
         extractor = pycolmap.FeatureExtractor.create(options, pycolmap.Device.cpu)
         photos = []
         for number, view in enumerate(ordered, start=1):
             photos.append(_photo(pycolmap, view, extractor))
-            features.share(on_progress, 0.0, 0.7)(number / len(ordered), f"features of {number} photos")
+            features.scale_progress(on_progress, 0.0, 0.7)(
+                number / len(ordered), f"features of {number} photos"
+            )
         pairs = neighbor_pairs([photo.camera for photo in photos])
         matched_pairs: list[tuple[int, int]] = []
         pixels: list[tuple[FloatArray, FloatArray]] = []
@@ -174,7 +176,9 @@ def match_photos(views: Sequence[View], on_progress: OnProgress | None = None) -
             if len(match_rows) >= MIN_GEOMETRY_INLIERS:
                 matched_pairs.append((i, j))
                 pixels.append((photos[i].features[match_rows[:, 0]], photos[j].features[match_rows[:, 1]]))
-            features.share(on_progress, 0.7, 1.0)(number / len(pairs), f"{number} of {len(pairs)} pairs")
+            features.scale_progress(on_progress, 0.7, 1.0)(
+                number / len(pairs), f"{number} of {len(pairs)} pairs"
+            )
     return PhotoMatches(
         names=tuple(view.name for view in ordered),
         sizes=tuple((photo.camera.width, photo.camera.height) for photo in photos),

@@ -51,7 +51,7 @@ class Photo:
     camera: int
 
 
-def engine() -> Any:
+def import_pycolmap() -> Any:
     """Module pycolmap. Raises DatasetError where it is missing, or older than 4.2."""
     try:
         import pycolmap
@@ -63,9 +63,9 @@ def engine() -> Any:
 
 
 @contextlib.contextmanager
-def quiet() -> Iterator[None]:
+def silence_log() -> Iterator[None]:
     """Suppress pycolmap's log within the context."""
-    logging = engine().logging
+    logging = import_pycolmap().logging
     level = logging.minloglevel
     logging.minloglevel = _FATAL_LOG_LEVEL
     try:
@@ -74,14 +74,16 @@ def quiet() -> Iterator[None]:
         logging.minloglevel = level
 
 
-def call(function: Callable[..., Any], *args: Any, poll: Callable[[], None] | None = None, **kw: Any) -> Any:
+def call_cancellable(
+    function: Callable[..., Any], *args: Any, poll: Callable[[], None] | None = None, **kw: Any
+) -> Any:
     """Result of pycolmap's `function(*args, **kw)`, run in a thread that Ctrl-C ends at its next pause.
 
     `poll` is called several times a second meanwhile.
 
     Raises StoppedError with the reason where COLMAP fails.
     """
-    token = engine().CancellationToken()
+    token = import_pycolmap().CancellationToken()
     result: list[Any] = []
     failure: list[BaseException] = []
 
@@ -95,7 +97,7 @@ def call(function: Callable[..., Any], *args: Any, poll: Callable[[], None] | No
 
     ended = threading.Event()
     thread = threading.Thread(target=work, name="colmap", daemon=True)
-    with quiet():
+    with silence_log():
         thread.start()
         try:
             while not ended.wait(0.2):
@@ -112,10 +114,10 @@ def call(function: Callable[..., Any], *args: Any, poll: Callable[[], None] | No
 
 
 @contextlib.contextmanager
-def opened(path: Path) -> Iterator[Any]:
+def open_database(path: Path) -> Iterator[Any]:
     """Open database of a file, without log. Raises StoppedError with the reason where COLMAP fails."""
     try:
-        with quiet(), contextlib.closing(engine().Database.open(path)) as database:
+        with silence_log(), contextlib.closing(import_pycolmap().Database.open(path)) as database:
             yield database
     except (OSError, CagefieldError):
         raise
@@ -132,12 +134,12 @@ def create_database(path: Path, cameras: Sequence[Any], photos: Sequence[Photo])
 
     Camera and rig numbers count from 1 too. The file appears whole, or not at all.
     """
-    pycolmap = engine()
+    pycolmap = import_pycolmap()
     draft = path.with_suffix(".new")
     journals = [draft.with_name(draft.name + ending) for ending in ("-wal", "-shm")]
     for file in (draft, *journals):
         file.unlink(missing_ok=True)
-    with opened(draft) as database:
+    with open_database(draft) as database:
         for index, camera in enumerate(cameras, start=1):
             camera.camera_id = index
             database.write_camera(camera, use_camera_id=True)
@@ -188,7 +190,7 @@ def extract(
         "longer_side": longer_side,
         "masks": None if masks is None else str(masks),
     }
-    colmap_process.run("finding features", [task], progress)
+    colmap_process.run_tasks("finding features", [task], progress)
 
 
 def extract_in_process(
@@ -205,7 +207,7 @@ def extract_in_process(
 
     COLMAP aborts the process where it cannot write.
     """
-    pycolmap = engine()
+    pycolmap = import_pycolmap()
     options = pycolmap.FeatureExtractionOptions(use_gpu=False, max_image_size=longer_side)
     options.sift.max_num_features = features
     reader = pycolmap.ImageReaderOptions()
@@ -213,7 +215,7 @@ def extract_in_process(
         reader.mask_path = masks
     for start in range(0, len(names), _BATCH_PHOTOS):
         batch = list(names[start : start + _BATCH_PHOTOS])
-        call(
+        call_cancellable(
             pycolmap.extract_features,
             Path(database),
             Path(images),
@@ -245,7 +247,7 @@ def select_likely_pairs(
 
     steps = [*range(1, neighbors + 1), 16, 32, 64]
     pairs = {(i, i + step) for i in range(count) for step in steps if i + step < count}
-    with opened(database) as source:
+    with open_database(database) as source:
         descriptors = [_descriptors(source, index + 1) for index in range(count)]
     sample = np.concatenate([d[:: max(1, len(d) * count // 20000)] for d in descriptors])
     if len(sample) >= 64:
@@ -278,7 +280,7 @@ def _vlad(descriptors: npt.NDArray[np.float32], words: npt.NDArray[np.float32]) 
     return np.asarray(rooted / max(np.linalg.norm(rooted), 1e-12), np.float64)
 
 
-def share(on_progress: OnProgress | None, start: float, end: float) -> OnProgress:
+def scale_progress(on_progress: OnProgress | None, start: float, end: float) -> OnProgress:
     """Progress function of a stage that covers `start` to `end` of the whole."""
 
     def move(done: float, note: str) -> None:

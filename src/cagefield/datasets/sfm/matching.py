@@ -63,7 +63,7 @@ def match(
             copy = database if count == 1 else Path(shutil.copyfile(database, part / "database.db"))
             task = {"task": "match", "database": str(copy), "folder": str(part), "lines": lines[start:end]}
             tasks.append(task | {"verify": verify, "several": several, "seed": seed})
-        colmap_process.run("matching", tasks, progress)
+        colmap_process.run_tasks("matching", tasks, progress)
         if count > 1:
             for part in parts:
                 _merge(part / "database.db", database)
@@ -83,7 +83,7 @@ def match_in_process(
 
     `on_done` is called with the number of pairs done; the list of a batch of pairs is written to `folder`.
     """
-    pycolmap = features.engine()
+    pycolmap = features.import_pycolmap()
     options = pycolmap.FeatureMatchingOptions(
         use_gpu=False, skip_geometric_verification=not verify, num_threads=1
     )
@@ -97,7 +97,7 @@ def match_in_process(
     for start in range(0, len(lines), _TILE_PHOTOS**2):
         batch = lines[start : start + _TILE_PHOTOS**2]
         listing.write_text("".join(batch), encoding="utf-8")
-        features.call(
+        features.call_cancellable(
             pycolmap.match_image_pairs,
             Path(database),
             matching_options=options,
@@ -110,8 +110,8 @@ def match_in_process(
 
 def _merge(source: Path, target: Path) -> None:
     """Copy the matches and two-view geometries of `source` to `target`, where `target` lacks them."""
-    pycolmap = features.engine()
-    with features.opened(source) as one, features.opened(target) as other:
+    pycolmap = features.import_pycolmap()
+    with features.open_database(source) as one, features.open_database(target) as other:
         for pair, matches in zip(*one.read_all_matches(), strict=True):
             first, second = pycolmap.pair_id_to_image_pair(pair)
             if not other.exists_matches(first, second):

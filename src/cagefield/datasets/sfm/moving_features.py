@@ -64,9 +64,9 @@ class MatchedFeatures:
 
 def read_features(database: Path, count: int) -> MatchedFeatures:
     """Keypoints and verified matches of `count` photos in a COLMAP database."""
-    pycolmap = features.engine()
+    pycolmap = features.import_pycolmap()
     matches = {}
-    with features.opened(database) as source:
+    with features.open_database(database) as source:
         keypoints = [np.asarray(source.read_keypoints(n + 1), np.float64)[:, :2] for n in range(count)]
         for number, geometry in zip(*source.read_two_view_geometries(), strict=True):
             i, j = (n - 1 for n in pycolmap.pair_id_to_image_pair(number))
@@ -138,9 +138,9 @@ def remove_features(database: Path, moving: Sequence[Mask]) -> list[Pair]:
 
     The returned pairs have to be verified again.
     """
-    pycolmap = features.engine()
+    pycolmap = features.import_pycolmap()
     changed_pairs = []
-    with features.opened(database) as source:
+    with features.open_database(database) as source:
         for number, rows in zip(*source.read_all_matches(), strict=True):
             first, second = pycolmap.pair_id_to_image_pair(number)
             rows = np.asarray(rows, np.uint32).reshape(-1, 2)

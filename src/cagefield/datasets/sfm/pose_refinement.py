@@ -87,7 +87,7 @@ class PoseSolver:
         self, views: Sequence[View], folder: Path, on_progress: OnProgress | None = None, seed: int = 0
     ) -> None:
         """Find features of all photos, and matches of neighbors in pose and in order."""
-        pycolmap = features.engine()
+        pycolmap = features.import_pycolmap()
         self._views, self._folder, self._seed = views, folder, seed
         self._shrunk, self._names = triangulation.shrink_views(views, folder, on_progress, square=True)
         self._numbers, self._cameras = shared_cameras(pycolmap, [one.camera for one in self._shrunk])
@@ -98,20 +98,20 @@ class PoseSolver:
         self._database = folder / "database.db"
         photos = [Photo(n, c) for n, c in zip(self._names, self._numbers, strict=True)]
         features.create_database(self._database, self._cameras, photos)
-        extracting = features.share(on_progress, 0.05, 0.5)
+        extracting = features.scale_progress(on_progress, 0.05, 0.5)
         triangulation.extract_features(
             self._database, folder, self._names, MAX_ADJUSTMENT_FEATURES, extracting
         )
         near_pairs = triangulation.nearest_pairs([one.camera for one in self._shrunk])
         sequence_pairs = [(i, i + k) for i in range(len(views)) for k in SEQUENCE_STEPS if i + k < len(views)]
-        self._match(sorted({*near_pairs, *sequence_pairs}), features.share(on_progress, 0.5, 1.0))
+        self._match(sorted({*near_pairs, *sequence_pairs}), features.scale_progress(on_progress, 0.5, 1.0))
 
     def refine(self, expected_error: float, on_progress: OnProgress | None = None) -> RefinedPoses | None:
         """Bundle-adjusted cameras; None where too few photos keep enough observations.
 
         `expected_error` is the usual epipolar error of the given poses as a share of a photo's longer side.
         """
-        pycolmap = features.engine()
+        pycolmap = features.import_pycolmap()
         center, scale = triangulation.normalization([one.camera for one in self._shrunk])
         model = triangulation.posed_model(
             pycolmap, self._cameras, self._numbers, self._shrunk, self._names, center, scale
@@ -129,7 +129,7 @@ class PoseSolver:
                 _add_tangential(pycolmap, model, self._tangential)
             _adjust(pycolmap, model, float(bound), refine_focal=number < ADJUSTMENT_ROUNDS - 1)
             note = f"bundle adjustment {number + 1} of {ADJUSTMENT_ROUNDS}"
-            features.share(on_progress, 0.0, 1.0)((number + 1) / ADJUSTMENT_ROUNDS, note)
+            features.scale_progress(on_progress, 0.0, 1.0)((number + 1) / ADJUSTMENT_ROUNDS, note)
         return self._collect_poses(model, Similarity(scale, np.eye(3), center))
 
     def rebuild(self, on_progress: OnProgress | None = None) -> RefinedPoses | None:
@@ -141,9 +141,9 @@ class PoseSolver:
             if uses_all_pairs
             else features.select_likely_pairs(self._database, count)
         )
-        self._match(pairs, features.share(on_progress, 0.0, 0.5))
+        self._match(pairs, features.scale_progress(on_progress, 0.0, 0.5))
         matches = verified_matches(self._database, count)
-        mapping = features.share(on_progress, 0.5, 1.0)
+        mapping = features.scale_progress(on_progress, 0.5, 1.0)
         reconstructions = reconstruct(self._folder, self._names, matches, self._seed, mapping)
         if not reconstructions.models:
             return None
@@ -235,7 +235,9 @@ def _adjust(pycolmap: Any, model: Any, bound: float, refine_focal: bool) -> None
     for image_id in model.reg_image_ids():
         config.add_image(image_id)
     config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
-    with features.quiet():  # pycolmap.bundle_adjustment writes headings to stderr whatever the log's level
+    with (
+        features.silence_log()
+    ):  # pycolmap.bundle_adjustment writes headings to stderr whatever the log's level
         pycolmap.create_default_bundle_adjuster(options, config, model).solve()
     manager = pycolmap.ObservationManager(model)
     manager.filter_all_points3D(max(LAST_BOUND_PIXELS, 0.5 * bound), 1.0)

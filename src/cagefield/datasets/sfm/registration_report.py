@@ -28,11 +28,11 @@ class Matches:
 
 def verified_matches(database: Path, count: int) -> Matches:
     """Match of `count` photos that COLMAP has verified."""
-    pycolmap = features.engine()
+    pycolmap = features.import_pycolmap()
     counts = np.zeros((count, count), dtype=np.int64)
     no_parallax = np.zeros((count, count), dtype=bool)
     kinds = pycolmap.TwoViewGeometryConfiguration
-    with features.opened(database) as source:
+    with features.open_database(database) as source:
         for pair, geometry in zip(*source.read_two_view_geometries(), strict=True):
             i, j = (number - 1 for number in pycolmap.pair_id_to_image_pair(pair))
             counts[i, j] = counts[j, i] = len(geometry.inlier_matches)

@@ -111,7 +111,7 @@ def make_poses(
     Raises DatasetError where pycolmap is missing, where fewer than three photos are registered, and where the
     disk is full: `target` is then unchanged, and the work folder stays.
     """
-    features.engine()
+    features.import_pycolmap()
     record = photo_record(source, frames, masks)
     recover_folder(target, lambda folder: (folder / RECORD_FILE).is_file())
     work = work_folder(target)
@@ -121,7 +121,7 @@ def make_poses(
         with recorded_digest(work / DATABASE):
             report = _build(source, target, record, frames, masks, seed, on_progress)
     remove_work(work)
-    features.share(on_progress, 0.0, 1.0)(1.0, f"{report.placed} of {report.total} photos")
+    features.scale_progress(on_progress, 0.0, 1.0)(1.0, f"{report.placed} of {report.total} photos")
     return report
 
 
@@ -135,7 +135,9 @@ def _build(
     on_progress: OnProgress | None,
 ) -> PosesReport:
     work = work_folder(target)
-    photos, unreadable = prepare_photos(source, work, frames, features.share(on_progress, 0.0, 0.1), masks)
+    photos, unreadable = prepare_photos(
+        source, work, frames, features.scale_progress(on_progress, 0.0, 0.1), masks
+    )
     total = len(photos) + len(unreadable)
     if len(photos) < 3:
         reasons = "".join(f"; {name}: {reason}" for name, reason in list(unreadable.items())[:3])
@@ -154,7 +156,7 @@ def _build(
         features=8192 if len(photos) <= 60 else 4096,
         longer_side=FEATURE_SIDE_PIXELS,
         masks=plain_masks if plain_masks.is_dir() else None,
-        on_progress=features.share(on_progress, 0.1, 0.3),
+        on_progress=features.scale_progress(on_progress, 0.1, 0.3),
     )
     uses_all_pairs = len(photos) <= MAX_EXHAUSTIVE_PHOTOS
     pairs = (
@@ -162,9 +164,18 @@ def _build(
         if uses_all_pairs
         else features.select_likely_pairs(database, len(photos))
     )
-    match(database, names, pairs, verify=True, seed=seed, on_progress=features.share(on_progress, 0.3, 0.7))
+    match(
+        database,
+        names,
+        pairs,
+        verify=True,
+        seed=seed,
+        on_progress=features.scale_progress(on_progress, 0.3, 0.7),
+    )
     shared_matches = verified_matches(database, len(photos))
-    reconstructions = reconstruct(work, names, shared_matches, seed, features.share(on_progress, 0.7, 0.99))
+    reconstructions = reconstruct(
+        work, names, shared_matches, seed, features.scale_progress(on_progress, 0.7, 0.99)
+    )
     models = reconstructions.models
     if not models:
         raise DatasetError(f"{source}: {explain_no_model(photos, shared_matches)}")
@@ -197,7 +208,7 @@ def is_built_from(target: Path, source: Path, frames: int = 80, masks: Path | No
 
 def guess_cameras(photos: Sequence[RawPhoto]) -> tuple[list[Any], list[int]]:
     """(COLMAP's initial cameras, number of each photo's): one for all photos of one size and focal length."""
-    pycolmap = features.engine()
+    pycolmap = features.import_pycolmap()
     groups, numbers = features.number_groups((p.width, p.height, p.focal) for p in photos)
     cameras = []
     for index, (width, height, focal) in enumerate(groups):
@@ -230,7 +241,7 @@ def reconstruct(
     Where photos show things that move, a reconstruction without their features is preferred if it registers
     as many photos and the remaining matches agree with it better.
     """
-    mapping = features.share(on_progress, 0.0, 0.7)
+    mapping = features.scale_progress(on_progress, 0.0, 0.7)
     models, database = build_unambiguous_models(work, matches, seed, mapping)
     if not models:
         return Reconstructions(models)
@@ -242,9 +253,11 @@ def reconstruct(
     copy = work / "static_features.db"
     shutil.copyfile(database, copy)
     pairs = moving_features.remove_features(copy, moving)
-    verifying = features.share(on_progress, 0.7, 0.8)
+    verifying = features.scale_progress(on_progress, 0.7, 0.8)
     match(copy, names, pairs, verify=True, several=True, seed=seed, on_progress=verifying)
-    static = _map(work, copy, len(names), seed, features.share(on_progress, 0.8, 1.0), few_matches=True)
+    static = _map(
+        work, copy, len(names), seed, features.scale_progress(on_progress, 0.8, 1.0), few_matches=True
+    )
     if not static or static[0].num_reg_images() < models[0].num_reg_images():
         return Reconstructions(models)
     remaining = moving_features.read_features(copy, len(names))
@@ -282,17 +295,21 @@ def build_unambiguous_models(
         return _map(work, database, count, seed, on_progress), database
     distant = disambiguation.distant_pairs(matches.counts)
     chain = _map(
-        work, copy_without_pairs(database, distant), count, seed, features.share(on_progress, 0.0, 0.33)
+        work,
+        copy_without_pairs(database, distant),
+        count,
+        seed,
+        features.scale_progress(on_progress, 0.0, 0.33),
     )
     false_pairs: set[tuple[int, int]] = set()
     if chain:
         relative = disambiguation.relative_rotations(database, chain[0], distant)
         false_pairs = disambiguation.contradicting_pairs(disambiguation.model_rotations(chain[0]), relative)
-    plain_models = _map(work, database, count, seed, features.share(on_progress, 0.33, 0.66))
+    plain_models = _map(work, database, count, seed, features.scale_progress(on_progress, 0.33, 0.66))
     if not false_pairs:
         return plain_models, database
     pruned_database = copy_without_pairs(database, false_pairs)
-    pruned_models = _map(work, pruned_database, count, seed, features.share(on_progress, 0.66, 1.0))
+    pruned_models = _map(work, pruned_database, count, seed, features.scale_progress(on_progress, 0.66, 1.0))
     return (
         (pruned_models, pruned_database)
         if _size(pruned_models) >= _size(plain_models)
@@ -319,7 +336,7 @@ def _map(
     """Reconstructions, the one with the most photos first; `few_matches` lowers the number needed to register
     a photo.
     """
-    pycolmap = features.engine()
+    pycolmap = features.import_pycolmap()
     options = pycolmap.IncrementalPipelineOptions(min_model_size=3, random_seed=seed, max_num_models=10)
     options.mapper.random_seed = seed
     options.triangulation.random_seed = seed
@@ -342,7 +359,7 @@ def _map(
         done = min(placed[0], count)
         on_progress(done / count, f"{done} of {count} photos placed")
 
-    models = features.call(
+    models = features.call_cancellable(
         pycolmap.incremental_mapping,
         database,
         work / "colmap",
@@ -399,7 +416,7 @@ def _link(file: Path, target: Path) -> None:
 
 def _write_model(model: Any, folder: Path) -> None:
     """Write the files of a model. Raises OSError where they are truncated: COLMAP does not notice."""
-    with features.quiet():
+    with features.silence_log():
         model.write_binary(folder)
     try:
         check_complete(folder)

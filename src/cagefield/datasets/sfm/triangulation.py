@@ -71,7 +71,7 @@ def triangulate(
 
     Raises DatasetError where pycolmap is missing, or a photo cannot be read.
     """
-    pycolmap = features.engine()
+    pycolmap = features.import_pycolmap()
     if len(views) < 2:
         return None
     with TemporaryFolder("points") as folder:
@@ -81,7 +81,7 @@ def triangulate(
         cameras = [_build_camera(pycolmap, one.camera) for one in shrunk]
         features.create_database(database, cameras, [Photo(n, i) for i, n in enumerate(names)])
         count = 4096 if len(views) <= 150 else 2048
-        extract_features(database, folder, names, count, features.share(on_progress, 0.05, 0.45))
+        extract_features(database, folder, names, count, features.scale_progress(on_progress, 0.05, 0.45))
         pairs = nearest_pairs([one.camera for one in shrunk])
         match(
             database,
@@ -89,7 +89,7 @@ def triangulate(
             pairs,
             verify=False,
             seed=seed,
-            on_progress=features.share(on_progress, 0.45, 0.95),
+            on_progress=features.scale_progress(on_progress, 0.45, 0.95),
         )
         keypoints = _allow_matches(pycolmap, database, shrunk)
         numbers = list(range(len(views)))
@@ -110,7 +110,7 @@ def triangulate(
             points = collect_points(triangulated, shrunk, keypoints, to_world)
             if points is not None and len(points) >= MIN_TRIANGULATED_POINTS:
                 break
-        features.share(on_progress, 0.0, 1.0)(1.0, f"{0 if points is None else len(points)} points")
+        features.scale_progress(on_progress, 0.0, 1.0)(1.0, f"{0 if points is None else len(points)} points")
         return points
 
 
@@ -158,7 +158,7 @@ def shrink_views(
     shrunk = []
     for index, (view, name) in enumerate(zip(views, names, strict=True)):
         shrunk.append(_shrink(view, folder, name, square))
-        features.share(on_progress, 0.0, 0.05)((index + 1) / len(views), "photos")
+        features.scale_progress(on_progress, 0.0, 0.05)((index + 1) / len(views), "photos")
     return shrunk, names
 
 
@@ -230,7 +230,7 @@ def _allow_matches(pycolmap: Any, path: Path, shrunk: Sequence[ShrunkPhoto]) -> 
     """
     keypoints: list[FloatArray] = []
     directions: list[FloatArray] = []
-    with features.opened(path) as database:
+    with features.open_database(path) as database:
         for index, one in enumerate(shrunk, start=1):
             camera = one.camera
             pixels = (
@@ -333,7 +333,7 @@ def triangulate_tracks(
     options.mapper.filter_max_reproj_error = bound
     out = folder / name
     out.mkdir()
-    return features.call(
+    return features.call_cancellable(
         pycolmap.triangulate_points,
         model,
         database,
