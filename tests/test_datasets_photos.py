@@ -70,7 +70,7 @@ def test_photos_are_converted_in_tiles(tmp_path, monkeypatch, channels, factor):
     save(tmp_path / "a.png", RNG.integers(0, 256, (47, 20, channels), dtype=np.uint8))
     whole = read_photo(tmp_path / "a.png", factor)
     for pixels in (1, 50, 200, 400):
-        monkeypatch.setattr(image_files, "_TILE", pixels)
+        monkeypatch.setattr(image_files, "_TILE_PIXELS", pixels)
         np.testing.assert_array_equal(read_photo(tmp_path / "a.png", factor), whole)
 
 

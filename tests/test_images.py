@@ -54,7 +54,7 @@ def test_pictures_are_converted_in_tiles(tmp_path, monkeypatch, mode):
     whole = read_image(tmp_path / "a.png")
     assert whole.shape == (41, 30, 4 if mode in ("RGBA", "LA", "P") else 3)
     for pixels in (1, 100, 300):
-        monkeypatch.setattr(image_files, "_TILE", pixels)
+        monkeypatch.setattr(image_files, "_TILE_PIXELS", pixels)
         np.testing.assert_array_equal(read_image(tmp_path / "a.png"), whole)
     monkeypatch.undo()
     picture.resize((1000, 1000), Image.Resampling.NEAREST).save(tmp_path / "b.png")
