@@ -83,9 +83,11 @@ class DistanceCells:
         bound[rows] = coarse
         near = np.flatnonzero(coarse < CELL_SIZE)
         rows, cell = rows[near], cell[near]
-        gap, primitive_of, instance_of = self._evaluate_cells(np.ascontiguousarray(points[:, rows]), cell)
+        gap, nearest_primitive, nearest_instance = self._evaluate_cells(
+            np.ascontiguousarray(points[:, rows]), cell
+        )
         bound[rows] = np.where(gap < CELL_SIZE, gap, np.maximum(bound[rows], np.float32(CELL_SIZE)))
-        primitive[rows], instance[rows] = primitive_of, instance_of
+        primitive[rows], instance[rows] = nearest_primitive, nearest_instance
         return NearestSurfaces(bound, primitive, instance)
 
     def _evaluate_cells(self, points: Float32, cell: Int) -> tuple[Float32, Int, Int]:
@@ -104,13 +106,13 @@ class DistanceCells:
             gap[rows] = self._gap(int(index), points[:, row[rows]], instances[rows])
         best = np.full(len(cell), np.inf, np.float32)
         np.minimum.at(best, row, gap)
-        primitive_of, instance_of = np.full(len(cell), -1, np.intp), np.zeros(len(cell), np.intp)
+        nearest_primitive, nearest_instance = np.full(len(cell), -1, np.intp), np.zeros(len(cell), np.intp)
         is_nearest = np.flatnonzero((gap == best[row]) & (gap < CELL_SIZE))
-        primitive_of[row[is_nearest]], instance_of[row[is_nearest]] = (
+        nearest_primitive[row[is_nearest]], nearest_instance[row[is_nearest]] = (
             primitives[is_nearest],
             instances[is_nearest],
         )
-        return best, primitive_of, instance_of
+        return best, nearest_primitive, nearest_instance
 
     def _gap(self, index: int, points: Float32, instance: Int) -> Float32:
         """Bound [N] of one primitive's instances at points [3,N]."""

@@ -81,7 +81,7 @@ def build_person(position: Array, heading_deg: float, stride: float = 0.0) -> Pa
 
 
 def build_sheet(center: Array, normal: Array, roll_deg: float) -> Part:
-    """Sheet of checkered board about `middle` [3], facing along `normal` [3], rotated about it by
+    """Sheet of checkered board about `center` [3], facing along `normal` [3], rotated about it by
     `roll_deg`.
     """
     forward = normal / np.linalg.norm(normal)

@@ -106,15 +106,15 @@ def find_contradicting_photos(
     own.
     """
     agrees = np.zeros(count, dtype=bool)
-    for (i, j), one in zip(pairs, likenesses, strict=True):
-        if one > MIN_AGREEING_LIKENESS:
+    for (i, j), likeness in zip(pairs, likenesses, strict=True):
+        if likeness > MIN_AGREEING_LIKENESS:
             agrees[[i, j]] = True
-    contradicting_photos = {
+    contradicting_pairs = {
         pair
-        for pair, one in zip(pairs, likenesses, strict=True)
-        if one < MAX_CONTRADICTING_LIKENESS and agrees[list(pair)].all()
+        for pair, likeness in zip(pairs, likenesses, strict=True)
+        if likeness < MAX_CONTRADICTING_LIKENESS and agrees[list(pair)].all()
     }
-    return {index for pair in contradicting_photos for index in pair}
+    return {index for pair in contradicting_pairs for index in pair}
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +167,7 @@ def neighbor_pairs(images: Sequence[_SmallImage]) -> list[tuple[int, int]]:
     """Pairs (i, j), i < j, of cameras close to each other with similar viewing directions, each once."""
     origins = np.stack([image.camera.origin for image in images])
     forward = np.stack([image.camera.forward for image in images])
-    agreeing_share = set()
+    pairs = set()
     for i, image in enumerate(images):
         angle = np.arccos(np.clip(forward @ forward[i], -1.0, 1.0))
         distance = np.linalg.norm(origins - origins[i], axis=1) / image.median_depth
@@ -177,8 +177,8 @@ def neighbor_pairs(images: Sequence[_SmallImage]) -> list[tuple[int, int]]:
             for j in order.tolist()
             if j != i and angle[j] < MAX_TURN_RAD and distance[j] < MAX_DISTANCE_DEPTHS
         ]
-        agreeing_share |= {(min(i, j), max(i, j)) for j in neighbors[:MAX_COMPARED_NEIGHBORS]}
-    return sorted(agreeing_share)
+        pairs |= {(min(i, j), max(i, j)) for j in neighbors[:MAX_COMPARED_NEIGHBORS]}
+    return sorted(pairs)
 
 
 def pair_likeness(one: _SmallImage, other: _SmallImage) -> float:
