@@ -142,8 +142,8 @@ class Export:
         print(f"a page of {size / 1e6:.1f} MB: {shown}{way}")
         if size > LARGE_PAGE_BYTES:
             warnings.warn(
-                f"the page has {size / 1e6:.0f} MB, more than the {LARGE_PAGE_BYTES / 1e6:.0f} that most sites "
-                "and phones take well; a smaller field, or fewer splats, make a smaller one",
+                f"the page has {size / 1e6:.0f} MB, more than the {LARGE_PAGE_BYTES / 1e6:.0f} that most "
+                "sites and phones take well; a smaller field, or fewer splats, make a smaller one",
                 stacklevel=2,
             )
         if page.along is not None:
@@ -186,10 +186,8 @@ class Export:
         from cagefield.scene.import_splats import axis_of, nearest_up
 
         if isinstance(scene.field, SplatField):
-            splats, figures = (
-                edited_splats(scene),
-                ("edits baked in" if scene.edits.active else "without edits"),
-            )
+            splats = edited_splats(scene)
+            figures = "edits baked in" if scene.edits.active else "without edits"
         else:
             splats, figures = self._fitted(scene)
         if cages:

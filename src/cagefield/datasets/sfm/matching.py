@@ -39,7 +39,8 @@ def match(
     """Match the features of the photos `names[i]`, `names[j]` for all (i, j) in `pairs`.
 
     Pairs with matches are skipped. `verify` fits epipolar geometry to each pair; `several` fits more than
-    one, of things that move on their own, from MIN_STATIC_MATCHES matches on. The result does not depend on the
+    one, of things that move on their own, from MIN_STATIC_MATCHES matches on. The result does not depend on
+    the
     number of `processes`, which for None is one a core, and fewer for few pairs.
 
     Raises StoppedError where COLMAP fails.
