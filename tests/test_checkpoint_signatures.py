@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from cagefield.compute import devices
 from cagefield.datasets import load_dataset
 from cagefield.datasets.views import Dataset
 from cagefield.procedural import make_scene
@@ -55,6 +56,7 @@ def test_a_checkpoint_of_earlier_option_names_is_continued(
             return VoxelRun(photos, VoxelConfig(steps=4, resolution=16))
         return SplatRun(photos, SplatConfig(steps=4, splats=100))
 
+    devices.start()
     run, path = start(), tmp_path / "checkpoint.npz"
     run.advance()
     run.store(path)
