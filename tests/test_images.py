@@ -70,7 +70,7 @@ def test_pictures_are_converted_in_tiles(tmp_path, monkeypatch, mode):
 def test_tiles_cover_a_picture_once():
     for width, height, multiple in ((1, 1, 1), (500_000, 2, 2), (300, 900, 3), (5000, 4000, 8)):
         covered = np.zeros((height, width), np.uint8)
-        for x, y, end_x, end_y in image_files.tiles(width, height, multiple):
+        for x, y, end_x, end_y in image_files.iterate_tiles(width, height, multiple):
             covered[y:end_y, x:end_x] += 1
             assert x % multiple == y % multiple == 0 and (end_x - x) * (end_y - y) <= 1 << 16
         assert (covered == 1).all()
