@@ -87,7 +87,7 @@ def edits(renderer: Renderer, lattice: int) -> list[Edit]:
     found = []
     for _ in range(10):
         inner = Cage.box(middle + rng.uniform(-0.12, 0.12, 3) * size, 0.12 * size)
-        edit = Edit(inner, outer, lattice=lattice).translate(rng.uniform(-0.03, 0.03, 3) * size)
+        edit = Edit.continuous(inner, outer, lattice=lattice).translate(rng.uniform(-0.03, 0.03, 3) * size)
         found.append(edit.rotate(rng.uniform(-0.3, 0.3, 3)))
     return found
 

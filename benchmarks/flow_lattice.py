@@ -22,8 +22,8 @@ from benchmarks.common.machine import Machine
 from benchmarks.common.tables import Table, number, write_text
 from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
-from cagefield.edits.device.device_stack import DeviceStack
 from cagefield.edits.device.edit_lattice import LATTICE_STRAIN
+from cagefield.edits.device_stack import DeviceStack
 from cagefield.edits.operations import (
     MoveCorner,
     MoveEdge,
@@ -46,32 +46,34 @@ ROD, SLOT = Cage.box((0, 0, 0), (1.2, 0.3, 0.3)), Cage.box((0, 0, 0), (1.6, 0.8,
 VOXEL = 1.25 * 1.6 / 255
 
 EDITS: dict[str, Edit] = {
-    "translation": Edit(BOX, OUTER).translate((0.2, 0.1, 0)),
-    "turn by 45 degrees": Edit(BOX, OUTER).rotate((0, 0, np.pi / 4)),
-    "turn by 90 degrees": Edit(BOX, OUTER).rotate((0, 0, np.pi / 2)),
-    "turn by 180 degrees": Edit(BOX, OUTER).rotate((0, 0, np.pi)),
-    "scale by 2": Edit(BOX, OUTER).scale(2.0),
-    "rod turned by 180 degrees in a slot": Edit(ROD, SLOT).rotate((0, 0, np.pi)),
-    "corner dragged": Edit(BOX, OUTER).move_corner(7, (0.2, 0.2, 0.1)),
-    "edge dragged": Edit(BOX, OUTER).move_edge((3, 7), (0.2, 0.15, 0)),
-    "corner dragged after a turn by 90": Edit(BOX, OUTER)
+    "translation": Edit.continuous(BOX, OUTER).translate((0.2, 0.1, 0)),
+    "turn by 45 degrees": Edit.continuous(BOX, OUTER).rotate((0, 0, np.pi / 4)),
+    "turn by 90 degrees": Edit.continuous(BOX, OUTER).rotate((0, 0, np.pi / 2)),
+    "turn by 180 degrees": Edit.continuous(BOX, OUTER).rotate((0, 0, np.pi)),
+    "scale by 2": Edit.continuous(BOX, OUTER).scale(2.0),
+    "rod turned by 180 degrees in a slot": Edit.continuous(ROD, SLOT).rotate((0, 0, np.pi)),
+    "corner dragged": Edit.continuous(BOX, OUTER).move_corner(7, (0.2, 0.2, 0.1)),
+    "edge dragged": Edit.continuous(BOX, OUTER).move_edge((3, 7), (0.2, 0.15, 0)),
+    "corner dragged after a turn by 90": Edit.continuous(BOX, OUTER)
     .rotate((0.5, 0.2, 1.5))
     .move_corner(7, (0.1, -0.2, 0.1)),
-    "bent outer cage, turn by 45": Edit(BOX, BENT_OUTER).rotate((0, 0, np.pi / 4)),
-    "both bent, turn by 45": Edit(BENT, BENT_OUTER).rotate((0, 0, np.pi / 4)),
-    "both bent, oblique turn, scale": Edit(BENT, BENT_OUTER).rotate((1, 0.5, 1)).scale((0.9, 0.8, 1)),
+    "bent outer cage, turn by 45": Edit.continuous(BOX, BENT_OUTER).rotate((0, 0, np.pi / 4)),
+    "both bent, turn by 45": Edit.continuous(BENT, BENT_OUTER).rotate((0, 0, np.pi / 4)),
+    "both bent, oblique turn, scale": Edit.continuous(BENT, BENT_OUTER)
+    .rotate((1, 0.5, 1))
+    .scale((0.9, 0.8, 1)),
 }
 REACHED: dict[str, tuple[Edit, Operation]] = {
-    "translation": (Edit(BOX, OUTER), Translate((1.0, 0.2, 0))),
-    "turn": (Edit(BOX, OUTER), Rotate((0, 0, 180))),
-    "scale": (Edit(BOX, OUTER), Scale((4, 4, 4))),
-    "shear": (Edit(BOX, OUTER), Shear(xy=3.0)),
-    "corner": (Edit(BOX, OUTER), MoveCorner(7, (1, 1, 0.6))),
-    "edge": (Edit(BOX, OUTER), MoveEdge((3, 7), (0.7, 0.6, 0.1))),
-    "face": (Edit(BOX, OUTER), MoveFace("+x", (1, 0, 0))),
-    "both bent, translation": (Edit(BENT, BENT_OUTER), Translate((1.0, 0.2, 0))),
-    "both bent, turn": (Edit(BENT, BENT_OUTER), Rotate((0, 0, 180))),
-    "both bent, corner": (Edit(BENT, BENT_OUTER), MoveCorner(7, (1, 1, 0.6))),
+    "translation": (Edit.continuous(BOX, OUTER), Translate((1.0, 0.2, 0))),
+    "turn": (Edit.continuous(BOX, OUTER), Rotate((0, 0, 180))),
+    "scale": (Edit.continuous(BOX, OUTER), Scale((4, 4, 4))),
+    "shear": (Edit.continuous(BOX, OUTER), Shear(xy=3.0)),
+    "corner": (Edit.continuous(BOX, OUTER), MoveCorner(7, (1, 1, 0.6))),
+    "edge": (Edit.continuous(BOX, OUTER), MoveEdge((3, 7), (0.7, 0.6, 0.1))),
+    "face": (Edit.continuous(BOX, OUTER), MoveFace("+x", (1, 0, 0))),
+    "both bent, translation": (Edit.continuous(BENT, BENT_OUTER), Translate((1.0, 0.2, 0))),
+    "both bent, turn": (Edit.continuous(BENT, BENT_OUTER), Rotate((0, 0, 180))),
+    "both bent, corner": (Edit.continuous(BENT, BENT_OUTER), MoveCorner(7, (1, 1, 0.6))),
 }
 
 

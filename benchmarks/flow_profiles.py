@@ -27,22 +27,22 @@ BENT = Cage.box((0.1, 0, 0), 0.6, (0.05, 0.1, 0.1)).move_corner(2, (-0.15, 0.15,
 BENT_OUTER = OUTER.move_corner(3, (0.3, 0.2, -0.1)).move_corner(4, (-0.2, 0.1, -0.3))
 EDITS = {
     **{f"{c.scene} {c.name}": continuous(c) for c in CASES if c.kind == "continuous"},
-    "turn 30": Edit(BOX, OUTER).rotate((0, 0, np.pi / 6)),
-    "turn 90": Edit(BOX, OUTER).rotate((0, 0, np.pi / 2)),
-    "turn 180": Edit(BOX, OUTER).rotate((0, 0, np.pi)),
-    "oblique turn": Edit(BOX, OUTER).rotate((1.9, 0.5, 1.3)),
-    "90% of the gap": Edit(BOX, OUTER).translate((0.45, 0, 0)),
-    "into a corner": Edit(BOX, OUTER).translate((0.4, 0.4, -0.4)),
-    "scale 0.3": Edit(BOX, OUTER).scale(0.3),
-    "scale 2": Edit(BOX, OUTER).scale(2.0),
-    "corner out": Edit(BOX, OUTER).move_corner(7, (0.3, 0.3, 0.3)),
-    "corner in": Edit(BOX, OUTER).move_corner(7, (-0.16, -0.16, -0.16)),
-    "shear": Edit(BOX, OUTER).shear(xy=0.6, zx=-0.4),
-    "off centre, turn 90": Edit(ASIDE, OUTER).rotate((0, 0, 1.57)),
-    "bent cages": Edit(BENT, BENT_OUTER).rotate((1.0, 0.5, 1.0)).scale((0.9, 0.8, 1.0)),
-    "turn in a slot": Edit(Cage.box((0, 0, 0), (1.2, 0.3, 0.3)), Cage.box((0, 0, 0), (1.6, 0.8, 0.8))).rotate(
-        (0, 0, np.pi)
-    ),
+    "turn 30": Edit.continuous(BOX, OUTER).rotate((0, 0, np.pi / 6)),
+    "turn 90": Edit.continuous(BOX, OUTER).rotate((0, 0, np.pi / 2)),
+    "turn 180": Edit.continuous(BOX, OUTER).rotate((0, 0, np.pi)),
+    "oblique turn": Edit.continuous(BOX, OUTER).rotate((1.9, 0.5, 1.3)),
+    "90% of the gap": Edit.continuous(BOX, OUTER).translate((0.45, 0, 0)),
+    "into a corner": Edit.continuous(BOX, OUTER).translate((0.4, 0.4, -0.4)),
+    "scale 0.3": Edit.continuous(BOX, OUTER).scale(0.3),
+    "scale 2": Edit.continuous(BOX, OUTER).scale(2.0),
+    "corner out": Edit.continuous(BOX, OUTER).move_corner(7, (0.3, 0.3, 0.3)),
+    "corner in": Edit.continuous(BOX, OUTER).move_corner(7, (-0.16, -0.16, -0.16)),
+    "shear": Edit.continuous(BOX, OUTER).shear(xy=0.6, zx=-0.4),
+    "off centre, turn 90": Edit.continuous(ASIDE, OUTER).rotate((0, 0, 1.57)),
+    "bent cages": Edit.continuous(BENT, BENT_OUTER).rotate((1.0, 0.5, 1.0)).scale((0.9, 0.8, 1.0)),
+    "turn in a slot": Edit.continuous(
+        Cage.box((0, 0, 0), (1.2, 0.3, 0.3)), Cage.box((0, 0, 0), (1.6, 0.8, 0.8))
+    ).rotate((0, 0, np.pi)),
 }
 
 

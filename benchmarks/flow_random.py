@@ -111,7 +111,7 @@ def random_edit(rng: np.random.Generator) -> Edit:
     A, b = outer.affine
     inner = Cage.box(b + A @ rng.uniform(0.3, 0.7, 3), rng.uniform(0.2, 0.9, 3), rng.uniform(-3, 3, 3))
     inner, outer = bent(inner, rng), bent(outer, rng)
-    edit = Edit(inner, outer)
+    edit = Edit.continuous(inner, outer)
     edit.check()
     for _ in range(rng.integers(1, 4)):
         operation = random_operation(rng)

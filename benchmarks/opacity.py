@@ -150,7 +150,7 @@ def _scaled(
     moved = model.move(parts, scale=factors, pivot=pivot).with_modeled_light()
     # The edit scales about the cage's centre; what remains takes that to where scaling about the pivot does.
     shift = (1.0 - np.array(factors)) * (pivot - cage.center)
-    edit = Edit(cage, adjustment="discrete").scale(factors).translate(shift)
+    edit = Edit.move(cage).scale(factors).translate(shift)
     truth = np.stack([moved.photograph(camera, background="white").rgb8() for camera in cameras])
     what = "all" if len(parts) > 1 else parts[0]
     same = "x".join(f"{f:g}" for f in factors)

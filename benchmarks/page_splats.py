@@ -118,9 +118,9 @@ def edits_of(field: SplatField) -> dict[str, EditStack]:
     inner = Cage.box(field.center, 0.5 * size)
     # Room to turn in, across the axis of the turn too.
     around = np.maximum(1.1 * size, 0.9 * np.linalg.norm(size[[0, 2]]) * np.array([1.0, 0.0, 1.0]))
-    twisted = Edit(inner, Cage.box(field.center, around)).rotate((0.0, 0.7, 0.0))
+    twisted = Edit.continuous(inner, Cage.box(field.center, around)).rotate((0.0, 0.7, 0.0))
     part = Cage.box(field.center - (0.0, 0.25 * size[1], 0.0), 0.5 * size)
-    moved = Edit(part, adjustment="discrete").translate((0.4 * size[0], 0.0, 0.0))
+    moved = Edit.move(part).translate((0.4 * size[0], 0.0, 0.0))
     return {"": EditStack(), "twisted": EditStack([twisted]), "moved": EditStack([moved])}
 
 

@@ -150,9 +150,9 @@ def edits_table(count: int) -> Table:
     )
     edits = EditStack(
         [
-            Edit(a, a.grown(0.35)).rotate((0, 0, 0.7)).scale((1.2, 1, 1)),
-            Edit(b, b.grown(0.35)).translate((0.1, -0.05, 0.05)),
-            Edit(c, adjustment="discrete").translate((-0.2, 0.3, 0.4)),
+            Edit.continuous(a, a.grown(0.35)).rotate((0, 0, 0.7)).scale((1.2, 1, 1)),
+            Edit.continuous(b, b.grown(0.35)).translate((0.1, -0.05, 0.05)),
+            Edit.move(c).translate((-0.2, 0.3, 0.4)),
         ]
     )
     field = random_splats(count)

@@ -83,28 +83,33 @@ LONG = Cage.box((0, 0, 1.0), (0.5, 0.5, 0.9)), Cage.box((0.3, 0, 0.35), (2.4, 2.
 CASES = {
     "stretched by 4": (
         rod(),
-        Edit(Cage.box((0, 0, 0.3), (0.6, 0.6, 0.5)), Cage.box((0, 0, 0.3), (2, 2, 3.6))).scale((1, 1, 4)),
+        Edit.continuous(Cage.box((0, 0, 0.3), (0.6, 0.6, 0.5)), Cage.box((0, 0, 0.3), (2, 2, 3.6))).scale(
+            (1, 1, 4)
+        ),
     ),
     "twisted by 150 degrees": (
         sheet(),
-        Edit(Cage.box((0, 0, 1.1), (1.6, 0.8, 0.8)), Cage.box((0, 0, 0.25), (3, 3, 3))).rotate(
+        Edit.continuous(Cage.box((0, 0, 1.1), (1.6, 0.8, 0.8)), Cage.box((0, 0, 0.25), (3, 3, 3))).rotate(
             (0, 0, np.radians(150))
         ),
     ),
-    "bent by 60 degrees": (rod(), Edit(*LONG).translate((0.4, 0, -0.1)).rotate((0, np.radians(60), 0))),
+    "bent by 60 degrees": (
+        rod(),
+        Edit.continuous(*LONG).translate((0.4, 0, -0.1)).rotate((0, np.radians(60), 0)),
+    ),
     "a ball, its top turned by 90 degrees and lifted": (
         ball(),
-        Edit(Cage.box((0, 0, 0.7), (1.2, 1.2, 0.5)), Cage.box((0, 0, 0.4), (2.4, 2.4, 2.2)))
+        Edit.continuous(Cage.box((0, 0, 0.7), (1.2, 1.2, 0.5)), Cage.box((0, 0, 0.4), (2.4, 2.4, 2.2)))
         .translate((0, 0, 0.2))
         .rotate((0, 0, np.radians(90))),
     ),
     "a leaning rod, a part of it pushed across": (
         leaning_rod(),
-        Edit(Cage.box((0, 0, 0), 0.5), Cage.box((0, 0, 0), 2.0)).translate((-0.35, 0, 0.1)),
+        Edit.continuous(Cage.box((0, 0, 0), 0.5), Cage.box((0, 0, 0), 2.0)).translate((-0.35, 0, 0.1)),
     ),
     "bent, its end outside the cage": (
         rod(),
-        Edit(Cage.box((0, 0, 0.8), 0.5), Cage.box((0.3, 0, 0.2), (2.4, 2.4, 2.6)))
+        Edit.continuous(Cage.box((0, 0, 0.8), 0.5), Cage.box((0.3, 0, 0.2), (2.4, 2.4, 2.6)))
         .translate((0.55, 0, -0.1))
         .rotate((0, np.radians(60), 0)),
     ),

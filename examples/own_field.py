@@ -44,7 +44,9 @@ class OwnField:
 
 def main(path):
     field, cage = OwnField(Torus()), Cage.box((0.6, 0, 0), (0.5, 0.7, 0.5))
-    edits = EditStack([Edit(cage, cage.grown(0.25), lattice=32).scale((1, 1, 1.4)).translate((0.1, 0, 0.1))])
+    edits = EditStack(
+        [Edit.continuous(cage, cage.grown(0.25), lattice=32).scale((1, 1, 1.4)).translate((0.1, 0, 0.1))]
+    )
     camera = turntable((0, 0, 0), 3.0, 1, elevation=0.7, width=64, height=64, fov_x=0.7)[0]
     exact = render_sampled(field, camera, samples=64, edits=edits)
     fast = Renderer(bake(field, 64), edits).render(camera, background="white")

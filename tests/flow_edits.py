@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import assume
 from hypothesis import strategies as st
 
-from cagefield.edits import Edit
+from cagefield.edits import Edit, Flow
 from cagefield.errors import CageError, EditError
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
@@ -27,24 +27,30 @@ ROD, SLOT = Cage.box((0, 0, 0), (1.2, 0.3, 0.3)), Cage.box((0, 0, 0), (1.6, 0.8,
 
 
 EDITS = {
-    "turn of 90": Edit(INNER, OUTER).rotate((0, 0, np.pi / 2)),
-    "turn of 180": Edit(INNER, OUTER).rotate((0, 0, np.pi)),
-    "translation by 90% of the gap": Edit(INNER, OUTER).translate((0.45, 0, 0)),
-    "scale 0.3": Edit(INNER, OUTER).scale(0.3),
-    "scale 2.4": Edit(INNER, OUTER).scale(2.4),
-    "shear": Edit(INNER, OUTER).shear(xy=0.6, zx=-0.4),
-    "corner after rotation": Edit(INNER, OUTER).rotate((0.5, 0.2, 1.5)).move_corner(7, (0.1, -0.2, 0.1)),
-    "scale of a turned cage": Edit(INNER, OUTER).rotate((0.5, 0.2, 0.5)).scale((0.6, 1.5, 1.1)),
-    "bent cages": Edit(BENT, BENT_OUTER).rotate((1.0, 0.5, 1.0)).scale((0.9, 0.8, 1.0)),
-    "bent far": Edit(INNER, OUTER.grown(1.0)).move_corner(7, (-0.31, -0.42, 0.36)),
-    "turn in a slot": Edit(ROD, SLOT).rotate((0, 0, np.pi)),
-    "linear, half": Edit(INNER, OUTER, falloff="linear", width=0.5).rotate((0, 0, 1)).translate((0.1, 0, 0)),
+    "turn of 90": Edit.continuous(INNER, OUTER).rotate((0, 0, np.pi / 2)),
+    "turn of 180": Edit.continuous(INNER, OUTER).rotate((0, 0, np.pi)),
+    "translation by 90% of the gap": Edit.continuous(INNER, OUTER).translate((0.45, 0, 0)),
+    "scale 0.3": Edit.continuous(INNER, OUTER).scale(0.3),
+    "scale 2.4": Edit.continuous(INNER, OUTER).scale(2.4),
+    "shear": Edit.continuous(INNER, OUTER).shear(xy=0.6, zx=-0.4),
+    "corner after rotation": Edit.continuous(INNER, OUTER)
+    .rotate((0.5, 0.2, 1.5))
+    .move_corner(7, (0.1, -0.2, 0.1)),
+    "scale of a turned cage": Edit.continuous(INNER, OUTER).rotate((0.5, 0.2, 0.5)).scale((0.6, 1.5, 1.1)),
+    "bent cages": Edit.continuous(BENT, BENT_OUTER).rotate((1.0, 0.5, 1.0)).scale((0.9, 0.8, 1.0)),
+    "bent far": Edit.continuous(INNER, OUTER.grown(1.0)).move_corner(7, (-0.31, -0.42, 0.36)),
+    "turn in a slot": Edit.continuous(ROD, SLOT).rotate((0, 0, np.pi)),
+    "linear, half": Edit.continuous(INNER, OUTER, shell=Flow(falloff="linear", width=0.5))
+    .rotate((0, 0, 1))
+    .translate((0.1, 0, 0)),
 }
 
 
 def shell_of(edit: Edit, strain: float = 0.125) -> FlowShell:
     assert edit.outer is not None
-    return FlowShell(edit.inner, edit.deformed, edit.outer, Falloff(edit.falloff, edit.width), strain)
+    return FlowShell(
+        edit.inner, edit.deformed, edit.outer, Falloff(edit.shell.falloff, edit.shell.width), strain
+    )
 
 
 def shell_points(shell: FlowShell, n: int, seed: int = 0) -> Array:
@@ -68,7 +74,7 @@ def flow_edits(draw: st.DrawFn) -> Edit:
     inner = Cage.box(b + A @ rng.uniform(0.35, 0.65, 3), rng.uniform(0.2, 0.8, 3), rng.uniform(-3, 3, 3))
     inner = dragged(inner, rng.uniform(-1, 1, (8, 3)) @ inner.affine[0].T, bent)
     outer = dragged(outer, rng.uniform(-0.3, 0.3, (8, 3)) @ A.T, bent)
-    edit = Edit(inner, outer)
+    edit = Edit.continuous(inner, outer)
     assume(can_be_evaluated(edit))
     for _ in range(draw(st.sampled_from([1, 2, 3, 10]))):
         kind = draw(st.integers(0, 8))

@@ -14,7 +14,7 @@ from cagefield.scene.scene import Scene
 SIZE = 120
 """Of the scene's pictures."""
 
-MOVE = Edit(Cage.box((0.6, 0.5, 0.3), (1.0, 0.9, 0.9)), adjustment="discrete").translate((0.0, -0.5, 0.8))
+MOVE = Edit.move(Cage.box((0.6, 0.5, 0.3), (1.0, 0.9, 0.9))).translate((0.0, -0.5, 0.8))
 
 
 def lumps(

@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, assume, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from cagefield.edits import shell_kind
 from cagefield.edits.edit import Edit
 from cagefield.edits.operations import (
     MoveCorner,
@@ -65,7 +66,7 @@ def edits(draw: st.DrawFn, fold_free: float = 0.95, shell: str = "trilinear") ->
     inner = Cage(b + (0.5 + (np.asarray(Cage.box(0.0 * b, 1.0).corners)) * rng.uniform(0.2, 0.6, 3)) @ A.T)
     inner = dragged(inner, rng.uniform(-1.0, 1.0, (8, 3)) @ inner.affine[0].T, bend)
     outer = dragged(outer, rng.uniform(-0.3, 0.3, (8, 3)) @ A.T, bend)
-    edit = Edit(inner, outer, shell=shell)
+    edit = Edit.continuous(inner, outer, shell=shell_kind(shell))
     assume(can_be_evaluated(edit))
     gap = np.linalg.norm(A, axis=0).min() * 0.25
     for kind in draw(st.lists(st.integers(0, 6), min_size=1, max_size=3)):

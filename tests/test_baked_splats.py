@@ -20,10 +20,13 @@ from splat_scenes import random_splats
 
 INNER = Cage.box((0, 0, 0), (1.2, 1.0, 1.4))
 CONTINUOUS = (
-    Edit(INNER, INNER.grown(0.5)).rotate((0.1, 0.3, -0.2)).scale((1.2, 0.8, 1.1)).translate((0.05, 0, 0))
+    Edit.continuous(INNER, INNER.grown(0.5))
+    .rotate((0.1, 0.3, -0.2))
+    .scale((1.2, 0.8, 1.1))
+    .translate((0.05, 0, 0))
 )
-TURNED = Edit(INNER, adjustment="discrete").rotate((0.0, 0.0, math.pi / 2))
-COPIED = Edit(INNER, adjustment="discrete", keep_source=True).translate((0, 1.5, 0))
+TURNED = Edit.move(INNER).rotate((0.0, 0.0, math.pi / 2))
+COPIED = Edit.copy(INNER).translate((0, 1.5, 0))
 
 
 @pytest.mark.parametrize("preserve", [True, False])
@@ -43,7 +46,9 @@ def test_pictures_are_those_of_the_edits(stack: list[Edit], preserve: bool) -> N
 def test_splats_beyond_the_edits_are_the_fields_own() -> None:
     field = random_splats(300, degree=1)
     small = Cage.box((0.6, 0, 0), 0.3)
-    baked = baked_splats(field, EditStack([Edit(small, small.grown(0.2)).rotate((0, 0, 0.4))]), split=False)
+    baked = baked_splats(
+        field, EditStack([Edit.continuous(small, small.grown(0.2)).rotate((0, 0, 0.4))]), split=False
+    )
     outside = ~small.grown(0.2).contains(field.means.astype(float))
     count = int(outside.sum())
     assert 200 < count < 300 == len(baked)
@@ -59,7 +64,7 @@ def test_a_rotation_turns_axes_and_colours_and_keeps_scales() -> None:
     whole = Cage.box((0, 0, 0), 10.0)
     turn = Rotation.from_euler("xyz", (0.3, -0.7, 1.1)).as_matrix()
     angles = Rotation.from_matrix(turn).as_euler("XYZ")
-    baked = baked_splats(field, EditStack([Edit(whole, adjustment="discrete").rotate(angles)]), split=False)
+    baked = baked_splats(field, EditStack([Edit.move(whole).rotate(angles)]), split=False)
     np.testing.assert_allclose(baked.means, field.means @ turn.T, atol=1e-5)
     np.testing.assert_allclose(np.sort(baked.log_scales), np.sort(field.log_scales), atol=1e-5)
     before, after = (

@@ -31,7 +31,7 @@ from cagefield.cameras.camera import Camera
 from cagefield.cli import main, parse
 from cagefield.cli.options import TrainingOptions
 from cagefield.cli.photo_options import PhotoOptions
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Copy, Edit, EditStack
 from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage
 from cagefield.images.image_files import read_image
@@ -116,7 +116,7 @@ def test_cages_hold_one_part_and_it_lands_where_nothing_is(one: Case) -> None:
     if motion is not None:
         (edit,) = one.edits
         for name, p in solids(scene, edit.deformed.aabb).items():
-            assert not edit.deformed.contains(p).any() or (name == part and not edit.keep_source)
+            assert not edit.deformed.contains(p).any() or (name == part and not isinstance(edit, Copy))
 
 
 def held_by(one: Case, p: np.ndarray) -> np.ndarray:
@@ -176,7 +176,7 @@ def test_views_that_are_right_do_not_make_the_mean_infinite() -> None:
 def test_an_edit_of_nothing_loses_nothing(bench: Workbench) -> None:
     scene = bench.scene("microphone")
     cameras = scene.cameras["test"]
-    still = Edit(Cage.box((0, 0, 0), 1.0), Cage.box((0, 0, 0), 2.0))
+    still = Edit.continuous(Cage.box((0, 0, 0), 1.0), Cage.box((0, 0, 0), 2.0))
     truth = bench.modeled("microphone", cameras)
     shown, edited = (seen(scene.with_edits(EditStack(e)), cameras) for e in ([], [still]))
     figures = compare(shown, edited, truth, truth)

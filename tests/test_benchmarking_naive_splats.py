@@ -26,8 +26,8 @@ pytestmark = pytest.mark.nightly
 INNER = Cage.box((0, 0, 0), 0.9)
 CAMERA = Camera.look_at((2.6, -1.9, 1.4), (0, 0, 0), width=48, height=40, fov_x=0.75)
 EDITS = {
-    "turn": Edit(INNER, INNER.grown(0.3)).rotate((0.2, 0.4, 1.0)),
-    "copy": Edit(INNER, adjustment="discrete", keep_source=True).rotate((0, 0, 0.7)).translate((1, 0, 0)),
+    "turn": Edit.continuous(INNER, INNER.grown(0.3)).rotate((0.2, 0.4, 1.0)),
+    "copy": Edit.copy(INNER).rotate((0, 0, 0.7)).translate((1, 0, 0)),
     "delete": Edit.delete(INNER),
 }
 
@@ -53,7 +53,7 @@ def test_each_way_lacks_what_its_name_says(name: str) -> None:
 def test_pictures_are_those_of_the_scene_where_nothing_is_bent_cut_or_turned() -> None:
     field = random_splats(200, degree=2)
     cage = Cage.box((0, 0, 0), 50.0)
-    scene = Scene(field=field, edits=EditStack([Edit(cage, adjustment="discrete").translate((0.2, 0, 0))]))
+    scene = Scene(field=field, edits=EditStack([Edit.move(cage).translate((0.2, 0, 0))]))
     want = np.clip(SplatRenderer(field, scene.edits).render(CAMERA, background="white").rgb, 0.0, 1.0)
     for _, pictures in seen_naively(scene, [CAMERA]):
         np.testing.assert_allclose(pictures[0], want, atol=1e-6)

@@ -15,7 +15,7 @@ from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.patcher import Patcher
 from cagefield.completion.splat_patch import relight_splats
 from cagefield.completion.surfaces.grid_block import extract_block
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, PreparedEdit, PreparedStack
 from cagefield.edits.patch import SplatPatch
 from cagefield.fields.sh import C0
 from cagefield.fields.voxel_field import VoxelField
@@ -33,7 +33,7 @@ GAP = 0.1
 
 INNER = Cage.box((0.1, 0.0, -0.13), (0.6, 0.6, 0.38))
 OUTER = Cage.box((0.1, 0.0, 0.13), (1.2, 1.2, 0.94))
-RAISED = Edit(INNER, OUTER, lattice=32).translate((0.0, 0.0, LIFT))
+RAISED = Edit.continuous(INNER, OUTER, lattice=32).translate((0.0, 0.0, LIFT))
 
 
 def room(lift: float, resolution: int = VERTICES) -> VoxelField:
@@ -67,7 +67,7 @@ def test_what_is_lifted_takes_its_shade_off_the_ground():
     assert light is not None
     bare, lit = (
         db(seen(field, EditStack([RAISED])), truth),
-        db(seen(field, EditStack([light, RAISED])), truth),
+        db(seen(field, PreparedStack([light, RAISED])), truth),
     )
     assert lit > bare + 5.0
 
@@ -76,7 +76,7 @@ def test_light_changes_matter_only_right_under_what_is_lifted_and_far_things_kee
     field = room(0.0)
     light = relight_voxels(field, EditStack(), RAISED, LIGHT)
     assert light is not None
-    block = extract_block(field, EditStack([light]), field.bounds)
+    block = extract_block(field, PreparedStack([light]), field.bounds)
     plain = extract_block(field, EditStack(), field.bounds)
     where = plain.positions(block.density != plain.density)
     assert np.abs(where[:, :2] - [0.1, 0.0]).max() < 0.4
@@ -105,7 +105,7 @@ def test_what_was_hidden_under_what_is_lifted_is_ground():
     )
     light = relight_voxels(noisy, EditStack(), RAISED, LIGHT)
     assert light is not None
-    block = extract_block(noisy, EditStack([light]), noisy.bounds)
+    block = extract_block(noisy, PreparedStack([light]), noisy.bounds)
     top = np.zeros(block.shape, bool)
     top.reshape(-1)[
         field.vertices[under & (np.abs(where[:, 2] - FLOOR + 1.0 / VERTICES) < 1.0 / VERTICES)]
@@ -115,7 +115,7 @@ def test_what_was_hidden_under_what_is_lifted_is_ground():
     assert (block.density[top] > 0.3 * field.density.max()).mean() > 0.9
     light = relight_voxels(noisy, EditStack(), RAISED.replace(fill="none"), LIGHT)
     assert light is not None
-    block, plain = (extract_block(noisy, EditStack(stack), noisy.bounds) for stack in ([light], []))
+    block, plain = (extract_block(noisy, PreparedStack(stack), noisy.bounds) for stack in ([light], []))
     np.testing.assert_array_equal(block.density, plain.density)
 
 
@@ -140,12 +140,12 @@ def test_fog_between_the_ground_and_what_is_lifted_makes_no_veil():
         edit = RAISED.replace(fill=fill)
         light = relight_voxels(foggy, EditStack(), edit, LIGHT)
         assert light is not None
-        left.append(db(seen(foggy, EditStack([light, edit])), truth))
+        left.append(db(seen(foggy, PreparedStack([light, edit])), truth))
     assert left[1] > left[0] + 3.0
 
 
 def test_what_stays_where_it_is_has_no_other_light():
-    still = Edit(INNER, OUTER, lattice=32).translate((0.0, 0.0, 1e-6))
+    still = Edit.continuous(INNER, OUTER, lattice=32).translate((0.0, 0.0, 1e-6))
     assert relight_voxels(room(0.0), EditStack(), still, LIGHT) is None
 
 
@@ -155,14 +155,18 @@ def test_patchers_put_the_light_before_its_edit(kind: str):
     edit = RAISED.replace(name="raise")
     patcher = Patcher(field, (), lambda camera: pytest.fail("the light is known"))
     patcher.__dict__.update(light_model=LIGHT, _visibility=None)
-    light, same = patcher.prepare([edit])
-    assert same is edit and light.patch is not None and light.changes_anything
-    assert patcher.prepare([edit])[0] is light
-    assert tuple(patcher.prepare([edit], moving=True)) == (edit,)
-    assert tuple(patcher.prepare([edit], bending=False)) == (edit,)
-    assert tuple(patcher.prepare([edit.replace(relight="none")])) == (edit.replace(relight="none"),)
+    (prepared,) = patcher.prepare([edit])
+    light, same = prepared.steps
+    assert prepared.edit is same.edit is edit and same.light is None
+    assert light is prepared.light and light.patch is not None and light.edit.changes_anything
+    assert patcher.prepare([edit])[0].light is light
+    bare = (PreparedEdit(edit),)
+    assert tuple(patcher.prepare([edit], moving=True)) == bare
+    assert tuple(patcher.prepare([edit], relight_continuous=False)) == bare
+    unlit = edit.replace(relight="none")
+    assert tuple(patcher.prepare([unlit])) == (PreparedEdit(unlit),)
     patcher.__dict__["light_model"] = LightModel((), ())
-    assert tuple(patcher.prepare([edit])) == (edit,)
+    assert tuple(patcher.prepare([edit])) == bare
 
 
 def test_the_floor_goes_on_under_splats_that_are_lifted():
@@ -175,7 +179,7 @@ def test_the_floor_goes_on_under_splats_that_are_lifted():
     away = np.linalg.norm(np.maximum(np.abs(field.means[:, :2] - [0.1, 0.0]) - 0.25, 0.0), axis=1)
     under = on_floor & (away == 0.0)
     for fill in ("none", "surroundings"):
-        edit = Edit(inner, outer).translate((0.0, 0.0, 0.4)).replace(fill=fill)
+        edit = Edit.continuous(inner, outer).translate((0.0, 0.0, 0.4)).replace(fill=fill)
         light = relight_splats(field, EditStack(), edit, LIGHT)
         assert isinstance(light.patch, SplatPatch)
         taken = light.patch.takes_away(field.means.astype(np.float64))
@@ -197,7 +201,9 @@ def test_splats_under_what_is_lifted_get_lighter():
     means = field.means + np.where(on_floor, 0.0, 0.15)[:, None].astype(np.float32) * [[0.0, 0.0, 1.0]]
     field = dataclasses.replace(field, means=means)
     inner, outer = Cage.box((0.1, 0.0, 0.45), (0.62, 0.62, 0.66)), Cage.box((0.1, 0.0, 0.85), (1.3, 1.3, 1.5))
-    light = relight_splats(field, EditStack(), Edit(inner, outer).translate((0.0, 0.0, 0.4)), LIGHT)
+    light = relight_splats(
+        field, EditStack(), Edit.continuous(inner, outer).translate((0.0, 0.0, 0.4)), LIGHT
+    )
     assert isinstance(light.patch, SplatPatch)
     log = light.patch.light.at(field.means.astype(np.float64))
     away = np.linalg.norm(np.maximum(np.abs(field.means[:, :2] - [0.1, 0.0]) - 0.25, 0.0), axis=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.edits.device.buffer_pool import BufferPool
+from cagefield.edits.buffer_pool import BufferPool
 
 
 def part(value: float, rows: int = 4) -> np.ndarray:

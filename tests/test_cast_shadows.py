@@ -67,7 +67,7 @@ def seen(shown: Scene) -> NDArray[np.float32]:
 def moved(relight: str | CastShadow) -> EditStack:
     """The box elsewhere."""
     cage = Cage.box((*AT, 0.5 * (FLOOR + TOP) + 0.02), (0.5, 0.5, TOP - FLOOR + 0.02))
-    edit = Edit(cage, adjustment="discrete", relight=relight)  # type: ignore[arg-type]
+    edit = Edit.move(cage, relight=relight)  # type: ignore[arg-type]
     return EditStack([edit.translate((TO[0] - AT[0], TO[1] - AT[1], 0.0))])
 
 

@@ -145,7 +145,7 @@ def test_info_says_what_is_there(capsys: pytest.CaptureFixture[str], scene: Path
 
 
 def test_info_says_how_many_voxels_a_lattice_is_off(capsys: pytest.CaptureFixture[str], scene: Path) -> None:
-    edit = Edit(Cage.box((0, 0, 0), 0.5), Cage.box((0, 0, 0), 1.5), lattice=12).rotate((0, 0, 0.6))
+    edit = Edit.continuous(Cage.box((0, 0, 0), 0.5), Cage.box((0, 0, 0), 1.5), lattice=12).rotate((0, 0, 0.6))
     edited = Scene.open(scene).with_edits(EditStack([edit]))
     edited.save(scene, overwrite=True)
     (error,) = edited.lattice_errors()

@@ -37,8 +37,8 @@ from scenes import ball_field, ball_scene
 from splat_scenes import ball_of_splats, random_splats, splat_scene
 
 INNER = Cage.box((0, 0, 0), 1.3)
-MOVED = Edit(INNER, adjustment="discrete", name="ball").translate((0.25, 0, 0))
-COPIED = Edit(INNER, adjustment="discrete", keep_source=True, name="copy").translate((0, 3, 0))
+MOVED = Edit.move(INNER, name="ball").translate((0.25, 0, 0))
+COPIED = Edit.copy(INNER, name="copy").translate((0, 3, 0))
 
 
 def saved(scene: Scene, folder: Path, *edits: Edit) -> Path:

@@ -11,6 +11,7 @@ import pytest
 
 from cagefield import Cage, Edit, EditStack, Scene
 from cagefield.cli import main
+from cagefield.edits import Trilinear
 from cagefield.images.image_files import read_image
 from commands import refused
 from scenes import ball_scene, files_of
@@ -20,7 +21,7 @@ from scenes import ball_scene, files_of
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A scene folder whose ball is moved up."""
     path = tmp_path_factory.mktemp("render") / "scene"
-    lift = Edit(Cage.box((0, 0, 0), 1.2), adjustment="discrete").translate((0, 0, 0.4))
+    lift = Edit.move(Cage.box((0, 0, 0), 1.2)).translate((0, 0, 0.4))
     ball_scene().with_edits(EditStack([lift])).save(path)
     return path
 
@@ -173,7 +174,7 @@ def test_one_picture_needs_one_view(scene: Path, tmp_path: Path, capsys: pytest.
 
 def test_edits_that_fold_are_refused(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     inner = Cage.box((0, 0, 0), 1.2)
-    twisted = Edit(inner, inner.grown(0.5), name="twist", shell="trilinear").rotate((0, 0, 1.5))
+    twisted = Edit.continuous(inner, inner.grown(0.5), shell=Trilinear(), name="twist").rotate((0, 0, 1.5))
     Scene.open(scene).with_edits(EditStack([twisted])).save(tmp_path / "folded")
     error = refused(capsys, "render", tmp_path / "folded", "-o", tmp_path / "out")
     assert 'edit "twist"' in error and "is safe" in error

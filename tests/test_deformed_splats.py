@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cagefield.cameras.camera import Camera
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, Flow, Trilinear
 from cagefield.errors import EditError
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import Cage, rotation_matrix
@@ -33,34 +33,32 @@ CAMERA = Camera.look_at((2.6, -1.9, 1.4), (0, 0, 0), width=48, height=40, fov_x=
 ELSEWHERE = Cage.box((0.5, 0.2, 0.0), 0.4)
 
 EDITS = {
-    "translate": [Edit(INNER, OUTER).translate((0.2, 0.1, 0.0))],
-    "rotate": [Edit(INNER, OUTER).rotate((0.5, 0.3, 1.2))],
-    "scale": [Edit(INNER, OUTER, falloff="linear", width=0.7).scale((1.0, 0.8, 1.5))],
-    "corner": [Edit(INNER, OUTER).translate((0.1, 0.0, 0.0)).move_corner(7, (0.15, 0.1, 0.1))],
-    "bent outer": [Edit(INNER, BENT).rotate((0.0, 0.4, 0.4)).move_corner(0, (0.1, 0.1, 0.1))],
-    "trilinear": [Edit(INNER, OUTER, shell="trilinear").translate((0.1, 0.1, 0.0))],
-    "lattice": [Edit(INNER, OUTER, lattice=16).rotate((0.0, 0.0, 0.5))],
-    "move": [Edit(INNER, adjustment="discrete").translate((0.5, 0.0, 0.0)).rotate((0, 0, 0.5))],
-    "bent move": [Edit(INNER, adjustment="discrete").move_corner(7, (0.4, 0.3, 0.2))],
-    "copy": [Edit(INNER, adjustment="discrete", keep_source=True).translate((0.4, 0.0, 0.0))],
+    "translate": [Edit.continuous(INNER, OUTER).translate((0.2, 0.1, 0.0))],
+    "rotate": [Edit.continuous(INNER, OUTER).rotate((0.5, 0.3, 1.2))],
+    "scale": [Edit.continuous(INNER, OUTER, shell=Flow(falloff="linear", width=0.7)).scale((1.0, 0.8, 1.5))],
+    "corner": [Edit.continuous(INNER, OUTER).translate((0.1, 0.0, 0.0)).move_corner(7, (0.15, 0.1, 0.1))],
+    "bent outer": [Edit.continuous(INNER, BENT).rotate((0.0, 0.4, 0.4)).move_corner(0, (0.1, 0.1, 0.1))],
+    "trilinear": [Edit.continuous(INNER, OUTER, shell=Trilinear()).translate((0.1, 0.1, 0.0))],
+    "lattice": [Edit.continuous(INNER, OUTER, lattice=16).rotate((0.0, 0.0, 0.5))],
+    "move": [Edit.move(INNER).translate((0.5, 0.0, 0.0)).rotate((0, 0, 0.5))],
+    "bent move": [Edit.move(INNER).move_corner(7, (0.4, 0.3, 0.2))],
+    "copy": [Edit.copy(INNER).translate((0.4, 0.0, 0.0))],
     "delete": [Edit.delete(INNER)],
     "disabled": [Edit.delete(INNER).replace(enabled=False)],
-    "nothing": [Edit(INNER, OUTER)],
+    "nothing": [Edit.continuous(INNER, OUTER)],
 }
 EDITS["copy, then move"] = [
     *EDITS["copy"],
-    Edit(Cage.box((0.2, 0, 0), (1.4, 0.4, 1.0)), adjustment="discrete").translate((0, 0, 0.7)),
+    Edit.move(Cage.box((0.2, 0, 0), (1.4, 0.4, 1.0))).translate((0, 0, 0.7)),
 ]
 EDITS["copy of a copy"] = [
     *EDITS["copy"],
-    Edit(Cage.box((0.2, 0, 0), (1.2, 0.5, 0.6)), adjustment="discrete", keep_source=True).translate(
-        (0.0, 0.7, 0.0)
-    ),
+    Edit.copy(Cage.box((0.2, 0, 0), (1.2, 0.5, 0.6))).translate((0.0, 0.7, 0.0)),
 ]
 EDITS["turn, copy, scale"] = [
     *EDITS["rotate"],
     *EDITS["copy"],
-    Edit(ELSEWHERE, ELSEWHERE.grown(0.25)).scale((1.0, 1.3, 1.0)),
+    Edit.continuous(ELSEWHERE, ELSEWHERE.grown(0.25)).scale((1.0, 1.3, 1.0)),
 ]
 
 
@@ -127,7 +125,10 @@ def test_an_empty_stack_returns_the_same_arrays():
     field = random_splats(50)
     plain = deformed_splats(field, EditStack())
     far = Cage.box((9, 9, 9), 0.5)
-    for edits in (EditStack(EDITS["nothing"]), EditStack([Edit(far, far.grown(0.5)).translate((0.1, 0, 0))])):
+    for edits in (
+        EditStack(EDITS["nothing"]),
+        EditStack([Edit.continuous(far, far.grown(0.5)).translate((0.1, 0, 0))]),
+    ):
         assert deformed_splats(field, edits) is plain
     assert plain.means is field.means and plain.sh is field.sh and plain.rotations is None
 
@@ -146,7 +147,7 @@ def test_what_no_edit_reaches_stays_bit_for_bit_and_shares_its_colours():
 
 def test_a_rigid_motion_of_everything_is_a_motion_of_the_camera():
     field, turn, shift = random_splats(60), np.array([0.3, -0.4, 0.9]), np.array([0.5, 0.2, -0.3])
-    edit = Edit(EVERYTHING, adjustment="discrete").rotate(turn).translate(shift)
+    edit = Edit.move(EVERYTHING).rotate(turn).translate(shift)
     R = rotation_matrix(turn)
     camera = posed(CAMERA, R @ CAMERA.c2w[:3, :3], R @ CAMERA.origin + shift)
     still = SplatRenderer(field).render(CAMERA)
@@ -158,7 +159,7 @@ def test_a_rigid_motion_of_everything_is_a_motion_of_the_camera():
 
 def test_scaling_everything_is_a_nearer_camera():
     field = random_splats(60)
-    edit = Edit(EVERYTHING, adjustment="discrete").scale(2.0)
+    edit = Edit.move(EVERYTHING).scale(2.0)
     camera = posed(CAMERA, CAMERA.c2w[:3, :3], 2.0 * CAMERA.origin)
     still = SplatRenderer(field).render(CAMERA)
     scaled = SplatRenderer(field, EditStack([edit])).render(camera)
@@ -189,15 +190,13 @@ def blob(scales=(0.12, 0.08, 0.05), depth: float = 0.3, at=(0.1, 0.0, 0.05)) -> 
 
 
 AFFINE = {
-    "turn": Edit(Cage.box((0, 0, 0), 1.4), adjustment="discrete").rotate((0.4, 0.2, 0.8)),
-    "stretch": Edit(Cage.box((0, 0, 0), 1.4), adjustment="discrete").scale((1.8, 1.0, 0.6)),
-    "shear": Edit(Cage.box((0, 0, 0), 1.4), adjustment="discrete").shear(xy=0.7, zx=-0.4),
-    "continuous": Edit(Cage.box((0, 0, 0), 1.4), Cage.box((0, 0, 0), 3.2), shell="trilinear").scale(
-        (1.3, 0.8, 1.6)
-    ),
-    "copy": Edit(Cage.box((0.1, 0, 0), (0.8, 1.4, 1.4)), adjustment="discrete", keep_source=True).translate(
-        (0.9, 0, 0)
-    ),
+    "turn": Edit.move(Cage.box((0, 0, 0), 1.4)).rotate((0.4, 0.2, 0.8)),
+    "stretch": Edit.move(Cage.box((0, 0, 0), 1.4)).scale((1.8, 1.0, 0.6)),
+    "shear": Edit.move(Cage.box((0, 0, 0), 1.4)).shear(xy=0.7, zx=-0.4),
+    "continuous": Edit.continuous(
+        Cage.box((0, 0, 0), 1.4), Cage.box((0, 0, 0), 3.2), shell=Trilinear()
+    ).scale((1.3, 0.8, 1.6)),
+    "copy": Edit.copy(Cage.box((0.1, 0, 0), (0.8, 1.4, 1.4))).translate((0.9, 0, 0)),
     "delete": Edit.delete(Cage.box((0, 0, 0), 1.4)),
 }
 
@@ -222,8 +221,8 @@ def test_a_blob_under_an_affine_edit_is_the_sampled_density(name):
 
 def test_a_splat_in_a_covered_place_is_hidden():
     field, _ = blob(at=(1.0, 0.0, 0.0))
-    onto = Edit(Cage.box((0, 0, 0), 0.5), adjustment="discrete").translate((1.0, 0.0, 0.0))
-    for edit in (onto, onto.replace(keep_source=True)):
+    onto = Edit.move(Cage.box((0, 0, 0), 0.5)).translate((1.0, 0.0, 0.0))
+    for edit in (onto, Edit.copy(onto.inner, operations=onto.operations)):
         assert len(deformed_splats(field, EditStack([edit]))) == 0
         # One that reaches over is split: its part beside the cage stays. This one does not.
         small = dataclasses.replace(field, log_scales=np.full_like(field.log_scales, np.log(0.02)))
@@ -235,8 +234,8 @@ def test_a_splat_in_a_covered_place_is_hidden():
 
 def test_a_copy_is_shown_twice_and_a_moved_copy_leaves_the_original():
     field, _ = blob(at=(0.0, 0.0, 0.0))
-    copy = Edit(Cage.box((0, 0, 0), 0.5), adjustment="discrete", keep_source=True).translate((1, 0, 0))
-    move = Edit(Cage.box((1, 0, 0), 0.5), adjustment="discrete").translate((0, 2, 0))
+    copy = Edit.copy(Cage.box((0, 0, 0), 0.5)).translate((1, 0, 0))
+    move = Edit.move(Cage.box((1, 0, 0), 0.5)).translate((0, 2, 0))
     means = deformed_splats(field, EditStack([copy, move])).means
     np.testing.assert_allclose(means[np.argsort(means[:, 1])], [[0, 0, 0], [1, 2, 0]], atol=1e-6)
     assert len(deformed_splats(field, EditStack([copy, Edit.delete(Cage.box((0, 0, 0), 0.5))]))) == 1
@@ -244,7 +243,7 @@ def test_a_copy_is_shown_twice_and_a_moved_copy_leaves_the_original():
 
 def test_a_copy_onto_itself_covers_the_part_that_it_lies_on():
     field = random_splats(3000)
-    edit = Edit(INNER, adjustment="discrete", keep_source=True).translate((0.2, 0, 0))
+    edit = Edit.copy(INNER).translate((0.2, 0, 0))
     got = deformed_splats(field, EditStack([edit])).means
     inside, target = INNER.contains(field.means), edit.deformed.contains(field.means)
     expected = np.concatenate([field.means[~target], field.means[inside] + np.float32([0.2, 0, 0])])
@@ -255,7 +254,7 @@ def test_a_copy_onto_itself_covers_the_part_that_it_lies_on():
 
 def test_opacity_without_preserving_it_is_what_a_uniform_scale_makes_of_the_ray():
     field, density = blob((0.06,) * 3, at=(0.0, 0.0, 0.0))
-    edits = EditStack([Edit(Cage.box((0, 0, 0), 0.9), adjustment="discrete").scale(2.0)])
+    edits = EditStack([Edit.move(Cage.box((0, 0, 0), 0.9)).scale(2.0)])
     camera = Camera.look_at((9.0, -6.0, 4.0), (0, 0, 0), width=41, height=41, fov_x=0.1)
     truth = render_sampled(
         density, camera, near=10.5, far=12.5, samples=130, edits=edits, background="black",
@@ -428,7 +427,7 @@ def test_proceed_gives_the_work_up(monkeypatch):
 
 
 def test_an_edit_that_cannot_be_evaluated_is_an_error():
-    edit = Edit(INNER, OUTER, name="door").translate((5.0, 0, 0))
+    edit = Edit.continuous(INNER, OUTER, name="door").translate((5.0, 0, 0))
     with pytest.raises(EditError, match=r'edit "door": .* is safe'):
         deformed_splats(random_splats(5), EditStack([edit]))
 

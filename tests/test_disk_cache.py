@@ -19,7 +19,7 @@ from cagefield.completion.lighting.diffuse_irradiance import DiffuseLight
 from cagefield.completion.lighting.directional_light import DirectionalLight
 from cagefield.completion.patch_cache import DiskCache
 from cagefield.completion.patcher import Patcher
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, PreparedEdit
 from cagefield.edits.patch import NewLight, Patch, SplatPatch
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.files import user_cache
@@ -51,8 +51,8 @@ def room(dark: float = 0.0) -> VoxelField:
     return solid_field(box | (z < -0.3), rgb)
 
 
-MOVE = Edit(Cage.box((0.0, 0.0, 0.05), (0.7, 0.7, 0.68)), adjustment="discrete").translate([0.5, 0.0, 0.0])
-BEND = Edit(MOVE.inner, Cage.box((0.0, 0.0, 0.2), (1.8, 1.8, 1.4))).translate([0.0, 0.0, 0.15])
+MOVE = Edit.move(Cage.box((0.0, 0.0, 0.05), (0.7, 0.7, 0.68))).translate([0.5, 0.0, 0.0])
+BEND = Edit.continuous(MOVE.inner, Cage.box((0.0, 0.0, 0.2), (1.8, 1.8, 1.4))).translate([0.0, 0.0, 0.15])
 
 
 class Counted:
@@ -128,7 +128,7 @@ def test_a_drag_before_anything_is_known_is_made_again_when_it_ends() -> None:
 def test_splats_have_the_same_patches_again() -> None:
     """Every class that a patch of splats and its light are made of is kept."""
     field = splat_room(True)
-    edit = Edit(splat_cage(), adjustment="discrete", relight="occlusion").translate([-0.5, 0.25, 0.0])
+    edit = Edit.move(splat_cage(), relight="occlusion").translate([-0.5, 0.25, 0.0])
     cameras = turntable((0.0, 0.0, 0.0), 3.0, 3, elevation=0.8, width=96, height=96, fov_x=0.6)
     renderer, pictures, found = SplatRenderer(field), [], []
 
@@ -172,7 +172,7 @@ def made_again(
 def test_all_that_results_follow_from_is_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     assert made_again((MOVE,)) and not made_again((MOVE,))
     assert not made_again((MOVE.replace(name="aside"),))
-    assert made_again((MOVE.replace(patch=RESULT),))
+    assert made_again((PreparedEdit(MOVE, RESULT),))
     assert made_again((MOVE.translate([0.0, 0.1, 0.0]),))
     assert made_again((MOVE.replace(fill="none"),))
     assert made_again((BEND, MOVE))

@@ -24,15 +24,23 @@ def device() -> None:
 def small(number: int) -> Edit:
     """One of ten edits whose outer cages do not meet."""
     middle = 0.55 * np.array([number % 3 - 1, number // 3 % 3 - 1, number // 9 - 0.5])
-    return Edit(Cage.box(middle, 0.2), Cage.box(middle, 0.5), lattice=8).rotate((0, 0, 0.1 + 0.1 * number))
+    return Edit.continuous(Cage.box(middle, 0.2), Cage.box(middle, 0.5), lattice=8).rotate(
+        (0, 0, 0.1 + 0.1 * number)
+    )
 
 
 APART = EditStack(small(number) for number in range(10))
-HALF = Edit(Cage.box((-0.3, 0, 0), 0.4), Cage.box((-0.3, 0, 0), 0.9), lattice=8).rotate((0, 0, 0.4))
-ACROSS = Edit(Cage.box((0.1, 0, 0), 0.3), Cage.box((0.1, 0, 0), 0.7), lattice=8).translate((0.1, 0, 0))
-FAR = Edit(Cage.box((0.7, 0.6, 0.6), 0.2), Cage.box((0.7, 0.6, 0.6), 0.4), lattice=8).translate((0, 0.05, 0))
-MOVE = Edit(Cage.box((0.1, 0.2, 0), 0.3), adjustment="discrete").translate((0, 0, 0.8))
-COPY = Edit(Cage.box((-0.3, 0, 0), 0.2), adjustment="discrete", keep_source=True).translate((0.2, 0.9, 0))
+HALF = Edit.continuous(Cage.box((-0.3, 0, 0), 0.4), Cage.box((-0.3, 0, 0), 0.9), lattice=8).rotate(
+    (0, 0, 0.4)
+)
+ACROSS = Edit.continuous(Cage.box((0.1, 0, 0), 0.3), Cage.box((0.1, 0, 0), 0.7), lattice=8).translate(
+    (0.1, 0, 0)
+)
+FAR = Edit.continuous(Cage.box((0.7, 0.6, 0.6), 0.2), Cage.box((0.7, 0.6, 0.6), 0.4), lattice=8).translate(
+    (0, 0.05, 0)
+)
+MOVE = Edit.move(Cage.box((0.1, 0.2, 0), 0.3)).translate((0, 0, 0.8))
+COPY = Edit.copy(Cage.box((-0.3, 0, 0), 0.2)).translate((0.2, 0.9, 0))
 
 CHANGES: dict[str, tuple[EditStack, EditStack]] = {
     "one of ten apart": (APART, APART.set(4, small(4).translate((0.1, 0.1, 0)))),
@@ -56,7 +64,7 @@ CHANGES: dict[str, tuple[EditStack, EditStack]] = {
 @pytest.mark.parametrize("name", CHANGES)
 def test_stacks_are_the_same_outside_the_changed_boxes(name: str) -> None:
     before, after = CHANGES[name]
-    exact = [EditStack(edit.replace(lattice=None) for edit in stack) for stack in (before, after)]
+    exact = [EditStack(edit.without_lattice() for edit in stack) for stack in (before, after)]
     boxes = exact[1].changed_boxes(exact[0])
     p = np.random.default_rng(0).uniform(-1.3, 1.3, (1500, 3))
     same = np.ones(len(p), dtype=bool)
@@ -131,7 +139,7 @@ def test_refresh_of_one_edit_in_ten_is_that_of_one_alone(monkeypatch: pytest.Mon
 
 
 def test_lattices_of_the_others_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cagefield.edits.device.device_stack import DeviceStack
+    from cagefield.edits.device_stack import DeviceStack
     from cagefield.warps import flow_lattice
 
     # All in the same outer cage: what one of them costs does not depend on where the others are.

@@ -6,7 +6,19 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from cagefield.edits import Edit, EditStack, Rotate, Scale, Shear, Translate
+from cagefield.edits import (
+    Edit,
+    EditStack,
+    Flow,
+    Rotate,
+    Scale,
+    Shear,
+    ShellSettings,
+    Translate,
+    Trilinear,
+    parse_edits,
+    shell_kind,
+)
 from cagefield.errors import EditError
 from cagefield.geometry import hexahedron
 from cagefield.geometry.cage import Cage
@@ -21,7 +33,11 @@ def points(n: int = 2000, reach: float = 1.2, seed: int = 0) -> np.ndarray:
 
 
 def continuous() -> Edit:
-    return Edit(INNER, OUTER, shell="trilinear").rotate((0.2, 0.1, 0.3)).move_corner(7, (0.1, 0.1, 0.05))
+    return (
+        Edit.continuous(INNER, OUTER, shell=Trilinear())
+        .rotate((0.2, 0.1, 0.3))
+        .move_corner(7, (0.1, 0.1, 0.05))
+    )
 
 
 @examples(15)
@@ -69,7 +85,7 @@ def test_directions_and_stretch_against_finite_differences() -> None:
 
 
 def test_move_has_four_regions() -> None:
-    edit = Edit(INNER, adjustment="discrete").translate((0.3, 0, 0))
+    edit = Edit.move(INNER).translate((0.3, 0, 0))
     p = points(5000)
     c = EditStack([edit]).to_canonical(p)
     in_v = (np.abs(p - (0.3, 0, 0)) <= 0.3).all(axis=1)
@@ -84,7 +100,7 @@ def test_move_has_four_regions() -> None:
 
 
 def test_copy_keeps_the_source() -> None:
-    edit = Edit(INNER, adjustment="discrete", keep_source=True).translate((0.9, 0, 0)).scale(0.5)
+    edit = Edit.copy(INNER).translate((0.9, 0, 0)).scale(0.5)
     p = points(5000)
     c = EditStack([edit]).to_canonical(p)
     in_v = (np.abs(p - (0.9, 0, 0)) <= 0.15).all(axis=1)
@@ -105,9 +121,7 @@ def test_delete_empties_the_cage() -> None:
 
 def test_stacks_compose_last_edit_first() -> None:
     first = continuous()
-    second = (
-        Edit(Cage.box((0.2, 0, 0), 0.4), adjustment="discrete").rotate((0, 0, 0.5)).translate((0, 0.3, 0))
-    )
+    second = Edit.move(Cage.box((0.2, 0, 0), 0.4)).rotate((0, 0, 0.5)).translate((0, 0.3, 0))
     p = points(3000)
     d = unit_vectors(np.random.default_rng(2), 3000)
     both = EditStack([first, second]).to_canonical(p, d)
@@ -129,8 +143,8 @@ def test_round_trip_through_a_chain() -> None:
     chain = EditStack(
         [
             continuous(),
-            Edit(INNER, OUTER, shell="trilinear").scale((1.3, 0.8, 1)),
-            Edit(OUTER, OUTER.grown(0.5)).translate((0, 0.2, 0)),
+            Edit.continuous(INNER, OUTER, shell=Trilinear()).scale((1.3, 0.8, 1)),
+            Edit.continuous(OUTER, OUTER.grown(0.5)).translate((0, 0.2, 0)),
         ]
     )
     p = points(2000, reach=1.5)
@@ -142,16 +156,16 @@ def test_round_trip_through_a_chain() -> None:
 
 def test_hidden_edits_and_edits_that_change_nothing_are_passed_over() -> None:
     p = points(100)
-    folded = Edit(INNER, OUTER, shell="trilinear").rotate((0, 0, 2.0))
-    nothing = Edit(INNER, OUTER, shell="trilinear")
+    folded = Edit.continuous(INNER, OUTER, shell=Trilinear()).rotate((0, 0, 2.0))
+    nothing = Edit.continuous(INNER, OUTER, shell=Trilinear())
     stack = EditStack([folded.replace(enabled=False), nothing])
     assert stack.active == () and np.array_equal(stack.to_canonical(p).points, p)
     assert np.array_equal(stack.bounds, [[np.inf] * 3, [-np.inf] * 3]) and stack.boxes.shape == (0, 2, 3)
-    assert not Edit(INNER, adjustment="discrete").changes_anything
+    assert not Edit.move(INNER).changes_anything
 
 
 def test_boxes_hold_everything_that_changes() -> None:
-    move = Edit(INNER, adjustment="discrete").translate((2, 0, 0))
+    move = Edit.move(INNER).translate((2, 0, 0))
     assert np.array_equal(move.boxes, [move.deformed.aabb, INNER.aabb])
     np.testing.assert_allclose(move.bounds, [(-0.3, -0.3, -0.3), (2.3, 0.3, 0.3)])
     stack = EditStack([continuous(), move])
@@ -166,7 +180,7 @@ def test_boxes_hold_everything_that_changes() -> None:
 
 
 def test_operations_are_recorded_and_return_new_edits() -> None:
-    start = Edit(INNER, OUTER, shell="trilinear")
+    start = Edit.continuous(INNER, OUTER, shell=Trilinear())
     edit = start.translate((0.1, 0, 0)).rotate((0, 0, np.radians(30.0))).scale(1.2).shear(xy=0.1)
     assert start.operations == ()
     assert edit.operations == (
@@ -201,7 +215,7 @@ def test_parts_of_operations() -> None:
 )
 def test_safe_fraction_has_a_closed_form_for_boxes(operation: object, fraction: float) -> None:
     # Folding needs the last 1e-3 of the gap (LEAST_RATIO), bisection stops at 1e-3.
-    edit = Edit(INNER, OUTER, shell="trilinear")
+    edit = Edit.continuous(INNER, OUTER, shell=Trilinear())
     assert edit.safe_fraction(operation) == pytest.approx(fraction, abs=2.5e-3)  # type: ignore[arg-type]
     assert edit.safe_fraction(operation) <= fraction  # type: ignore[arg-type]
     after = edit.then(operation.part(edit.safe_fraction(operation)))  # type: ignore[arg-type, attr-defined]
@@ -209,15 +223,18 @@ def test_safe_fraction_has_a_closed_form_for_boxes(operation: object, fraction: 
 
 
 def test_safe_fraction_counts_from_where_the_edit_is() -> None:
-    edit = Edit(INNER, OUTER, shell="trilinear").translate((0.25, 0, 0))
+    edit = Edit.continuous(INNER, OUTER, shell=Trilinear()).translate((0.25, 0, 0))
     assert edit.safe_fraction(Translate((0.5, 0, 0))) == pytest.approx(0.5, abs=2.5e-3)
-    assert edit.safe_fraction() == 1.0 and Edit(INNER, OUTER, shell="trilinear").safe_fraction() == 1.0
+    assert (
+        edit.safe_fraction() == 1.0
+        and Edit.continuous(INNER, OUTER, shell=Trilinear()).safe_fraction() == 1.0
+    )
     assert edit.translate((0.5, 0, 0)).safe_fraction() == pytest.approx(0.5, abs=2.5e-3)
-    assert Edit(INNER, OUTER, shell="trilinear").rotate((0, 0, 2 * np.pi)).safe_fraction() == 1.0
+    assert Edit.continuous(INNER, OUTER, shell=Trilinear()).rotate((0, 0, 2 * np.pi)).safe_fraction() == 1.0
 
 
 def test_folded_shells_are_errors_that_say_what_is_safe() -> None:
-    edit = Edit(INNER, OUTER, shell="trilinear", name="arm").rotate((0, 0, np.radians(60)))
+    edit = Edit.continuous(INNER, OUTER, shell=Trilinear(), name="arm").rotate((0, 0, np.radians(60)))
     message = r'edit "arm": the trilinear shell folds at side .*; 0\.49 of this rotation \(operation 1, by'
     for evaluate in (
         edit.check,
@@ -230,14 +247,17 @@ def test_folded_shells_are_errors_that_say_what_is_safe() -> None:
         ):
             evaluate()
     EditStack([edit.replace(allow_folding=True)]).to_canonical(points(200))
-    edit.replace(adjustment="discrete").check()
+    Edit.move(edit.inner, operations=edit.operations).check()
 
 
 def test_the_message_names_the_operation_that_went_too_far() -> None:
-    edit = Edit(INNER, OUTER, shell="trilinear").translate((0.7, 0, 0)).translate((-0.6, 0, 0))
+    edit = Edit.continuous(INNER, OUTER, shell=Trilinear()).translate((0.7, 0, 0)).translate((-0.6, 0, 0))
     edit.check()  # only the result counts
     edit = (
-        Edit(INNER, OUTER, shell="trilinear").rotate((0, 0, 0.1)).translate((0.6, 0, 0)).rotate((0, 0, 0.1))
+        Edit.continuous(INNER, OUTER, shell=Trilinear())
+        .rotate((0, 0, 0.1))
+        .translate((0.6, 0, 0))
+        .rotate((0, 0, 0.1))
     )
     with pytest.raises(
         EditError, match=r"0\.69 of this translation \(operation 2, by \(0.6, 0, 0\)\) is safe"
@@ -246,7 +266,7 @@ def test_the_message_names_the_operation_that_went_too_far() -> None:
 
 
 def test_an_inner_cage_that_leaves_the_outer_is_an_error() -> None:
-    edit = Edit(INNER, OUTER, shell="trilinear", name="arm").translate((0.6, 0, 0))
+    edit = Edit.continuous(INNER, OUTER, shell=Trilinear(), name="arm").translate((0.6, 0, 0))
     message = (
         r'edit "arm": outer cage must contain the inner cage: inner corner \d at \(0\.9, .*\) is 0\.1 outside'
         r" face \+x; 0\.83 of this translation .* is safe; enlarge the outer cage or use"
@@ -255,34 +275,34 @@ def test_an_inner_cage_that_leaves_the_outer_is_an_error() -> None:
     with pytest.raises(EditError, match=message):
         edit.check()
     with pytest.raises(EditError, match=r"inner corner . at .* is 0.2 outside face -z; enlarge"):
-        Edit(INNER.translate((0, 0, -0.7)), OUTER).check()
+        Edit.continuous(INNER.translate((0, 0, -0.7)), OUTER).check()
     with pytest.raises(EditError, match="is folded before any operation, at side -z: leave a gap"):
-        Edit(INNER.translate((0, 0, -0.5)), OUTER, shell="trilinear").translate((0, 0, 0.1)).check()
+        Edit.continuous(INNER.translate((0, 0, -0.5)), OUTER, shell=Trilinear()).translate(
+            (0, 0, 0.1)
+        ).check()
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Edit(INNER), "a continuous edit needs an outer cage.*grown"),
+        (lambda: Edit.continuous(INNER, None), "a continuous edit needs an outer cage.*grown"),
         (
-            lambda: Edit(INNER, OUTER, shell="trilinear", adjustment="fluid"),
-            'adjustment must be "continuous" or "discrete", got "fluid"',
+            lambda: Edit.continuous(INNER, OUTER, shell=shell_kind("cubic")),
+            'shell must be one of flow, trilinear, got "cubic"',
         ),
-        (lambda: Edit(INNER, OUTER, shell="cubic"), 'shell must be one of flow, trilinear, got "cubic"'),
-        (lambda: Edit(INNER, OUTER, shell="x" * 999), f'shell must be one of [a-z, ]*, got "{"x" * 40}"'),
         (
-            lambda: Edit(INNER, OUTER, shell="trilinear", keep_source=True),
-            'keep_source needs adjustment="discrete"',
+            lambda: Edit.continuous(INNER, OUTER, shell=shell_kind("x" * 999)),
+            f'shell must be one of [a-z, ]*, got "{"x" * 40}"',
         ),
-        (lambda: Edit(INNER, OUTER, shell="trilinear", deleted=True), 'deleted needs adjustment="discrete"'),
+        (lambda: Edit.continuous(INNER, OUTER, shell="flow"), r"shell must be Flow\(...\) or Trilinear\(\)"),
         (lambda: Edit.delete(INNER).translate((1, 0, 0)), "a delete has no operations"),
         (
-            lambda: Edit(INNER, OUTER, shell="trilinear", lattice=1),
+            lambda: Edit.continuous(INNER, OUTER, shell=Trilinear(), lattice=1),
             "lattice must be None .* from 2 to 512 .*got 1",
         ),
-        (lambda: Edit(INNER, OUTER, shell="trilinear", lattice=64.0), r"got 64\.0"),
+        (lambda: Edit.continuous(INNER, OUTER, shell=Trilinear(), lattice=64.0), r"got 64\.0"),
         (
-            lambda: Edit(INNER, OUTER, shell="trilinear", name="arm").move_corner(7, (-2, -2, -2)),
+            lambda: Edit.continuous(INNER, OUTER, shell=Trilinear(), name="arm").move_corner(7, (-2, -2, -2)),
             'edit "arm": operation 1, corner move of corner 7 .*inside out at corner 7 .*0.09 of it is safe',
         ),
         (lambda: EditStack([INNER]), "item 0 is a Cage"),
@@ -315,14 +335,23 @@ def test_empty_input() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Edit(INNER, OUTER, falloff="steep"), 'falloff must be one of smooth, linear, got "steep"'),
-        (lambda: Edit(INNER, OUTER, width=0.0), r"width must be above 0 and at most 1 .*got 0\.0"),
         (
-            lambda: Edit(INNER, OUTER, shell="trilinear", width=0.5),
+            lambda: Edit.continuous(INNER, OUTER, shell=Flow(falloff="steep")),
+            'falloff must be one of smooth, linear, got "steep"',
+        ),
+        (
+            lambda: Edit.continuous(INNER, OUTER, shell=Flow(width=0.0)),
+            r"width must be above 0 and at most 1 .*got 0\.0",
+        ),
+        (
+            lambda: parse_edits(
+                "edits: [{inner: {center: [0, 0, 0], size: 1}, outer: {margin: 1}, shell: trilinear,"
+                " width: .5}]"
+            ),
             'width is an option of the flow shell, and a trilinear shell has none; set shell="flow"',
         ),
         (
-            lambda: Edit(INNER, adjustment="discrete", falloff="linear"),
+            lambda: Edit.move(INNER, unused_shell=ShellSettings(shell=Flow(falloff="linear"))),
             "falloff is an option of the flow shell, and a discrete edit has none",
         ),
     ],
@@ -330,5 +359,8 @@ def test_empty_input() -> None:
 def test_falloff_belongs_to_the_flow_shell(make: Callable[[], Edit], message: str) -> None:
     with pytest.raises(EditError, match=message):
         make()
-    assert Edit(INNER, OUTER).shell == "flow"
-    assert Edit(INNER, OUTER, falloff="linear", width=0.5).rotate((0, 0, 0.3)).warp is not None
+    assert Edit.continuous(INNER, OUTER).shell == Flow()
+    assert (
+        Edit.continuous(INNER, OUTER, shell=Flow(falloff="linear", width=0.5)).rotate((0, 0, 0.3)).warp
+        is not None
+    )

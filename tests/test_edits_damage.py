@@ -43,10 +43,10 @@ def test_a_name_that_nothing_takes_is_refused_at_every_entry(
     message: str, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(EditError, match=message):
-        Edit(INNER, adjustment="discrete", name=name)
+        Edit.move(INNER, name=name)
     with pytest.raises(EditFileError, match=message):
         parse_edits(text_of(name), format="json")
-    session = Session(Document.of([Edit(INNER, adjustment="discrete")]), INNER.corners[[0, 7]], 0.1)
+    session = Session(Document.of([Edit.move(INNER)]), INNER.corners[[0, 7]], 0.1)
     for attempt in (
         lambda: session.load_edits(text_of(name), append=True),
         lambda: session.change(1, name=name),
@@ -88,7 +88,7 @@ def test_every_name_that_is_taken_comes_back_bit_for_bit(name: str) -> None:
     if problem_of_name(name) is not None:
         name = mended(name)
         assert problem_of_name(name) is None and len(name) <= MOST_CHARACTERS
-    stack = EditStack([Edit(INNER, adjustment="discrete", name=name)])
+    stack = EditStack([Edit.move(INNER, name=name)])
     for form in ("yaml", "json"):
         text = dump_edits(stack, format=form)
         assert parse_edits(text.encode().decode(), format=form)[0].name == name

@@ -11,10 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cagefield.edits import (
+    Copy,
+    Delete,
     Edit,
     EditStack,
+    Flow,
+    Move,
     MoveCorners,
     Rotate,
+    Trilinear,
     dump_edits,
     edit_files,
     load_edits,
@@ -42,7 +47,7 @@ def test_the_example_in_the_docstring_is_an_edit_file() -> None:
     first, second, third = parse_edits(text)
     assert third == Edit.paste("../microphone", Cage.box((0, 0, 0), 2), name="microphone")
     assert first.name == "arm up" and first.lattice == 64 and len(first.operations) == 8
-    assert second.deleted and second.inner == Cage.box((2, 0, 0), 0.5)
+    assert isinstance(second, Delete) and second.inner == Cage.box((2, 0, 0), 0.5)
 
 
 def test_every_key() -> None:
@@ -64,7 +69,7 @@ def test_every_key() -> None:
     )
     inner = Cage(Cage.box((1, 2, 3), (1, 2, 3), (0, 0, np.radians(30))).corners, pivot=np.array((1.0, 2, 0)))
     expected = (
-        Edit(inner, name="cup", adjustment="discrete", keep_source=True, enabled=False)
+        Edit.copy(inner, name="cup", enabled=False)
         .rotate((0, 0, np.radians(90)), axes="cage")
         .scale(2)
         .shear(zx=0.1, axes="cage")
@@ -83,9 +88,19 @@ def test_every_key() -> None:
 def test_round_trips_are_exact(edit: Edit, seed: int, kind: str, discrete: bool) -> None:
     rng = np.random.default_rng(seed)
     if discrete:
-        edit = edit.replace(adjustment="discrete", keep_source=bool(rng.integers(2)), name="Fuß #1: 'x'")
+        discrete = Copy if rng.integers(2) else Move
+        edit = discrete(
+            edit.inner,
+            operations=edit.operations,
+            unused_shell=edit.shell_settings,
+            **(edit.shared_options | {"name": "Fuß #1: 'x'"}),
+        )
     other = Edit.delete(Cage.box(rng.normal(size=3), rng.random(3) + 0.1, rng.normal(size=3)), name="1e3")
-    shown = Edit(INNER, OUTER, name="null", lattice=64, allow_folding=True).rotate((0, 0, 1.0)).shear(xy=1e-7)
+    shown = (
+        Edit.continuous(INNER, OUTER, lattice=64, allow_folding=True, name="null")
+        .rotate((0, 0, 1.0))
+        .shear(xy=1e-7)
+    )
     stack = EditStack([edit, other, shown])
     again = parse_edits(dump_edits(stack, format=kind), format=kind)
     for n in range(3):
@@ -95,7 +110,11 @@ def test_round_trips_are_exact(edit: Edit, seed: int, kind: str, discrete: bool)
 
 def test_files_are_what_a_person_would_write() -> None:
     tilted = Cage.box((0.1, 0.2, 0.3), (1, 2, 3), np.radians((10, 20, 30)))
-    edit = Edit(tilted, tilted.grown(0.7), name="arm").translate((0.1, 0, 0)).rotate(np.radians((0, 0, 12.5)))
+    edit = (
+        Edit.continuous(tilted, tilted.grown(0.7), name="arm")
+        .translate((0.1, 0, 0))
+        .rotate(np.radians((0, 0, 12.5)))
+    )
     assert edit.operations[1] == Rotate((0.0, 0.0, 12.5))
     assert dump_edits(EditStack([edit])) == (
         "version: 1\n"
@@ -112,7 +131,7 @@ def test_files_are_what_a_person_would_write() -> None:
 
 
 def test_save_and_load(tmp_path: Path) -> None:
-    stack = EditStack([Edit(INNER, OUTER, name="arm").translate((0.1, 0, 0))])
+    stack = EditStack([Edit.continuous(INNER, OUTER, name="arm").translate((0.1, 0, 0))])
     for name in ("edits.yaml", "edits.yml", "edits.json"):
         path = tmp_path / name
         path.write_text("old")
@@ -136,7 +155,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
 
 
 def test_edits_that_cannot_be_evaluated_are_errors_unless_asked_for(tmp_path: Path) -> None:
-    stack = EditStack([Edit(INNER, OUTER, name="arm", shell="trilinear").rotate((0, 0, 1))])
+    stack = EditStack([Edit.continuous(INNER, OUTER, shell=Trilinear(), name="arm").rotate((0, 0, 1))])
     path = tmp_path / "edits.yaml"
     save_edits(stack, path)
     with pytest.raises(
@@ -297,7 +316,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 def test_falloff_and_width_are_written_and_read() -> None:
     text = "- inner: {center: [0, 0, 0], size: 1}\n  outer: {margin: 1}\n  falloff: linear\n  width: 0.25\n"
     stack = parse_edits(text)
-    assert (stack[0].shell, stack[0].falloff, stack[0].width) == ("flow", "linear", 0.25)
+    assert stack[0].shell == Flow("linear", 0.25)
     assert parse_edits(dump_edits(stack)) == stack
     with pytest.raises(EditFileError, match=r"edits, line 1: \[0\]: edit: width must be above 0"):
         parse_edits(text.replace("0.25", "1.5"))

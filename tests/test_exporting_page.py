@@ -17,7 +17,7 @@ from cagefield.cameras.camera import Camera, turntable
 from cagefield.cameras.keyframe_files import dump_path
 from cagefield.cameras.keyframes import Keyframe, Timeline
 from cagefield.completion.patcher import Patcher
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Continuous, Edit, EditStack, Move, PreparedEdit, PreparedStack
 from cagefield.edits.partial_edit import partial_edit
 from cagefield.edits.patch import Patch
 from cagefield.errors import EditError
@@ -30,6 +30,7 @@ from cagefield.pages.page_path import MAGIC, VERSION
 from cagefield.pages.path_states import path_edits
 from cagefield.pages.scene_page import INDEX, NAMES, SCRIPT, ScenePage, write_folder
 from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.scene import Scene
 from commands import printed, refused
 from exported_page import pixels, rendered, settle, shown, until, web_server
 from hand import Hand
@@ -127,7 +128,7 @@ def test_the_camera_path_is_played(tmp_path: Path) -> None:
         np.testing.assert_allclose(end, ring[3].origin, atol=1e-6)
 
 
-TURN = Edit(Cage.box((0, 0, 0), (0.8, 0.8, 0.8)), Cage.box((0, 0, 0), (1.7, 1.6, 1.5)))
+TURN = Edit.continuous(Cage.box((0, 0, 0), (0.8, 0.8, 0.8)), Cage.box((0, 0, 0), (1.7, 1.6, 1.5)))
 
 
 BARE: Any = {"fill": "none", "relight": "none", "feather": 0.0}
@@ -137,9 +138,10 @@ BARE: Any = {"fill": "none", "relight": "none", "feather": 0.0}
 def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
     scene = lumps_scene()
     gone = Edit.delete(Cage.box((-0.8, 0.0, 0.0), (0.4, 1.8, 1.6))).replace(**BARE)
-    move = MOVE.replace(**BARE, patch=patch_by_hand(scene.field, MOVE.inner, part=True))
+    move = MOVE.replace(**BARE)
+    patch = patch_by_hand(scene.field, MOVE.inner, part=True)
     turn = TURN.rotate((0.0, 0.0, np.pi / 2)).replace(relight="none")
-    scene = dataclasses.replace(scene, edits=EditStack([turn, move, gone]))
+    scene = with_patch(dataclasses.replace(scene, edits=EditStack([turn, move, gone])), patch)
     pose = tuple(scene.cameras["test"][0].c2w.ravel())
     keys = (
         Keyframe(pose, 45.0, 2.0, {1: 0.0, 2: 0.0, 3: 0.0}),
@@ -162,11 +164,11 @@ def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
             settle(page)
             parts = line.parts(np.array([seconds]))
             there = [partial_edit(edit, float(parts[n][0])) for n, edit in enumerate(scene.edits, start=1)]
-            if parts[1][0] < 1.0:  # The patch shows what the turn makes once it is whole.
-                there = [edit and edit.replace(patch=None) for edit in there]
             stack = EditStack([edit for edit in there if edit is not None])
             camera = dataclasses.replace(_as_shown(scene.cameras["test"][0], 45.0))
-            pictures.append(rendered(dataclasses.replace(scene, edits=stack), camera))
+            # The patch shows what the turn makes once it is whole.
+            whole = with_patch(dataclasses.replace(scene, edits=stack), patch if parts[1][0] == 1.0 else None)
+            pictures.append(rendered(whole, camera))
             assert psnr(pixels(page), pictures[-1]) >= 36.0, seconds
         page.press("body", "h")
         settle(page)
@@ -178,10 +180,16 @@ def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
         assert psnr(one, other) < 30.0
 
 
+def with_patch(scene: Scene, patch: Patch | None) -> Scene:
+    """The scene, whose moves all show a patch."""
+    scene.__dict__["patcher"] = _MovePatches(patch, patch)
+    return scene
+
+
 class _Patches:
     """Gives discrete edits one patch while they move, and another then."""
 
-    def __init__(self, moving: Patch, settled: Patch) -> None:
+    def __init__(self, moving: Patch | None, settled: Patch | None) -> None:
         self.moving, self.settled = moving, settled
 
     def prepare(
@@ -189,12 +197,21 @@ class _Patches:
         edits: Sequence[Edit],
         *,
         moving: bool = False,
-        bending: bool = True,
+        relight_continuous: bool = True,
         preserve_opacity: bool = True,
-    ) -> EditStack:
+    ) -> PreparedStack:
         patch = self.moving if moving else self.settled
-        return EditStack(
-            edit if edit.adjustment == "continuous" else edit.replace(patch=patch) for edit in edits
+        return PreparedStack(
+            PreparedEdit(edit, None if isinstance(edit, Continuous) else patch) for edit in edits
+        )
+
+
+class _MovePatches(_Patches):
+    """Gives moves one patch, and no other edits any."""
+
+    def prepare(self, edits: Sequence[Edit], **options: Any) -> PreparedStack:
+        return PreparedStack(
+            PreparedEdit(edit, self.settled if isinstance(edit, Move) else None) for edit in edits
         )
 
 
@@ -245,7 +262,9 @@ def test_a_path_that_moves_no_edit_has_no_states() -> None:
 
 def test_parts_of_an_edit_that_are_impossible_are_named() -> None:
     """After a quarter turn the cage is inside again, on the way its corners are not."""
-    close = Edit(TURN.inner, Cage.box((0, 0, 0), (1.0, 1.0, 1.0)), name="spin").rotate((0.0, 0.0, np.pi / 2))
+    close = Edit.continuous(TURN.inner, Cage.box((0, 0, 0), (1.0, 1.0, 1.0)), name="spin").rotate(
+        (0.0, 0.0, np.pi / 2)
+    )
     scene = dataclasses.replace(lumps_scene(), edits=EditStack([close]))
     pose = tuple(scene.cameras["test"][0].c2w.ravel())
     keys = (Keyframe(pose, 45.0, 1.0, {1: 0.0}), Keyframe(pose, 45.0, 1.0))

@@ -34,9 +34,9 @@ from gpu_objects import COUNT
 from page_fields import MOVE, SIZE
 from splat_scenes import random_splats
 
-TURN = Edit(Cage.box((-0.3, 0, 0), (0.7, 0.8, 0.8)), Cage.box((-0.3, 0, 0), (1.3, 1.7, 1.6))).rotate(
-    (0.0, 0.0, np.pi / 2)
-)
+TURN = Edit.continuous(
+    Cage.box((-0.3, 0, 0), (0.7, 0.8, 0.8)), Cage.box((-0.3, 0, 0), (1.3, 1.7, 1.6))
+).rotate((0.0, 0.0, np.pi / 2))
 
 FRUIT = Path(__file__).resolve().parents[2] / "shared" / "data" / "splats" / "fruit_drops_minimal.ply"
 
@@ -193,7 +193,7 @@ def test_genuine_splats(tmp_path: Path) -> None:
     seen = turntable(
         field.center, 2.2 * radius, 2, elevation=-0.3, up=(0, -1, 0), width=SIZE, height=SIZE, fov_x=0.9
     )
-    edit = Edit(Cage.box(field.center, 0.5 * field.half_size), adjustment="discrete")
+    edit = Edit.move(Cage.box(field.center, 0.5 * field.half_size))
     scene = Scene(field, EditStack([edit.translate((0.0, -radius, 0.0))]), {"test": seen[:1]})
     file = tmp_path / "scene.html"
     file.write_text(ScenePage.of(scene, "fruit").one_file(), encoding="utf-8")

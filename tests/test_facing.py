@@ -56,9 +56,11 @@ def seen(shown: Scene) -> NDArray[np.float32]:
 def turned(relight: str, adjustment: str) -> EditStack:
     """The ball turned about the vertical axis through its middle, which leaves it a ball."""
     cage = Cage.box((0.0, 0.0, MIDDLE[2] + 0.02), (0.7, 0.7, 0.62))
-    outer = Cage.box((0.0, 0.0, MIDDLE[2] + 0.02), (1.3, 1.3, 0.9)) if adjustment == "continuous" else None
-    edit = Edit(cage, outer=outer, adjustment=adjustment, relight=relight, fill="none")  # type: ignore[arg-type]
-    return EditStack([edit.rotate((0.0, 0.0, 80.0 if outer is None else 40.0))])
+    if adjustment == "continuous":
+        outer = Cage.box((0.0, 0.0, MIDDLE[2] + 0.02), (1.3, 1.3, 0.9))
+        edit = Edit.continuous(cage, outer, relight=relight, fill="none")
+        return EditStack([edit.rotate((0.0, 0.0, 40.0))])
+    return EditStack([Edit.move(cage, relight=relight, fill="none").rotate((0.0, 0.0, 80.0))])
 
 
 @pytest.mark.parametrize("adjustment", ["discrete", "continuous"])

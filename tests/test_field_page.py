@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cagefield.cameras.camera import Camera, turntable
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, Trilinear
 from cagefield.errors import EditError
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
@@ -157,18 +157,24 @@ def test_what_is_closed_leaves_nothing_on_the_gpu(page: FieldPage) -> None:
 
 
 INNER, OUTER = Cage.box((0.1, 0.0, 0.0), (0.9, 0.8, 0.7)), Cage.box((0.1, 0.0, 0.0), (1.9, 1.6, 1.5))
-TURNED = Edit(INNER, OUTER, lattice=32, name="turned").rotate((0.1, 0.2, 0.7)).scale((1.1, 0.8, 1.0))
-BENT = Edit(INNER, OUTER, lattice=24).move_corner(7, (0.2, 0.1, 0.15)).move_face("-x", (-0.1, 0.0, 0.05))
-LEANING = Edit(
+TURNED = (
+    Edit.continuous(INNER, OUTER, lattice=32, name="turned").rotate((0.1, 0.2, 0.7)).scale((1.1, 0.8, 1.0))
+)
+BENT = (
+    Edit.continuous(INNER, OUTER, lattice=24)
+    .move_corner(7, (0.2, 0.1, 0.15))
+    .move_face("-x", (-0.1, 0.0, 0.05))
+)
+LEANING = Edit.continuous(
     INNER,
     Cage(OUTER.corners + 0.15 * (OUTER.corners[:, [2, 0, 1]] > 0.5)),
     lattice=24,
     name="outer cage bent",
 ).rotate((0.0, 0.0, 0.4))
-SHELL = Edit(INNER, OUTER, shell="trilinear", lattice=32).translate((0.15, 0.0, 0.1))
-MOVED = Edit(Cage.box((0.6, 0.5, 0.3), (1.0, 0.9, 0.9)), adjustment="discrete").translate((0.0, -0.5, 0.8))
+SHELL = Edit.continuous(INNER, OUTER, shell=Trilinear(), lattice=32).translate((0.15, 0.0, 0.1))
+MOVED = Edit.move(Cage.box((0.6, 0.5, 0.3), (1.0, 0.9, 0.9))).translate((0.0, -0.5, 0.8))
 COPIED = (
-    Edit(Cage.box((0.5, 0.3, 0.2), (0.6, 0.5, 0.6)), adjustment="discrete", keep_source=True)
+    Edit.copy(Cage.box((0.5, 0.3, 0.2), (0.6, 0.5, 0.6)))
     .translate((0.2, -0.4, 0.7))
     .move_corner(3, (0.1, 0.1, 0.1))
 )

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 
 from cagefield.compute import devices
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, Trilinear
 from cagefield.errors import DeviceError, EditError
 from cagefield.typing import Array
 from cagefield.warps.continuous import ContinuousWarp
@@ -27,7 +27,7 @@ def device() -> None:
 
 
 def compare(edits: list[Edit], n: int) -> None:
-    from cagefield.edits.device.device_stack import DeviceStack
+    from cagefield.edits.device_stack import DeviceStack
 
     stack = EditStack(edits)
     rng = np.random.default_rng(0)
@@ -57,7 +57,7 @@ def test_named_edits_against_the_reference(name: str) -> None:
 
 
 def test_chain_against_the_reference() -> None:
-    shell = Edit(INNER, OUTER, shell="trilinear").rotate((0, 0.1, 0.2))
+    shell = Edit.continuous(INNER, OUTER, shell=Trilinear()).rotate((0, 0.1, 0.2))
     compare([EDITS["turn of 90"], shell, EDITS["corner after rotation"]], 400)
 
 
@@ -69,7 +69,7 @@ def test_random_edits_against_the_reference(edit: Edit) -> None:
 
 @pytest.mark.parametrize("name", ["turn of 90", "bent cages", "linear, half"])
 def test_lattice_error_falls_with_its_order(name: str) -> None:
-    from cagefield.edits.device.device_stack import DeviceStack
+    from cagefield.edits.device_stack import DeviceStack
 
     edit = EDITS[name]
     p = shell_points(shell_of(edit), 400).astype(np.float32)
@@ -87,7 +87,7 @@ def test_lattice_error_falls_with_its_order(name: str) -> None:
 
 def nodes_and_reference(edit: Edit, resolution: int) -> tuple[Array, Array]:
     """(displacements [R^3,3] by the lattice's kernel, those of the exact map)."""
-    from cagefield.edits.device.device_stack import DeviceStack
+    from cagefield.edits.device_stack import DeviceStack
 
     nodes = DeviceStack.from_stack(EditStack([edit.replace(lattice=resolution)])).lattice
     warp = edit.exact_warp

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, Flow
 from cagefield.edits.operations import Operation, Rotate, Scale, Shear, Translate
 from cagefield.edits.safe_fraction import along, flow_reach, largest_safe
 from cagefield.errors import CageError, EditError
@@ -116,7 +116,7 @@ def test_map_against_another_integrator() -> None:
     gap, before = big - half * (np.cos(a) + np.sin(a)), big - half
     end = 0.95 - 0.45 * (gap / before) ** (1 / 0.8)
 
-    shell = shell_of(Edit(INNER, OUTER).rotate((0, 0, a)), strain=0.01)
+    shell = shell_of(Edit.continuous(INNER, OUTER).rotate((0, 0, a)), strain=0.01)
     p = shell_points(shell, 12)
     q, _ = shell.to_canonical(p)
     for x, expected in zip(p, q, strict=True):
@@ -126,7 +126,7 @@ def test_map_against_another_integrator() -> None:
 
 def test_order_of_convergence() -> None:
     # A translation along the diagonal: no point's way crosses a kink of the distances more than once.
-    edit = Edit(INNER, OUTER).translate((0.3, 0.25, 0.2)).scale(1.2)
+    edit = Edit.continuous(INNER, OUTER).translate((0.3, 0.25, 0.2)).scale(1.2)
     p = shell_points(shell_of(edit), 400)
     maps = [shell_of(edit, strain=s).to_canonical(p)[0] for s in (0.4, 0.2, 0.1, 0.0125)]
     errors = [np.median(np.linalg.norm(m - maps[-1], axis=1)) for m in maps[:-1]]
@@ -211,7 +211,7 @@ def test_weights_fade_from_one_to_nothing() -> None:
 def test_the_more_a_gap_changes_the_nearer_to_linear_is_the_weight() -> None:
     turn = EDITS["turn of 180"]
     assert shell_of(turn).coefficients[0] == pytest.approx(0.5, abs=1e-12)
-    assert shell_of(turn.replace(falloff="linear")).coefficients == (1.0, 0.0)
+    assert shell_of(turn.replace(shell=Flow("linear"))).coefficients == (1.0, 0.0)
     # A tenth of the gap is left: 0.95 - 0.45 e^(-log 10 / 0.8).
     push = shell_of(EDITS["translation by 90% of the gap"])
     assert push.coefficients[0] == pytest.approx(0.95 - 0.45 * 10.0 ** (-1.0 / 0.8), rel=1e-9)
@@ -225,7 +225,7 @@ def test_width_one_moves_all_of_the_shell_and_less_moves_less() -> None:
     p = shell_points(shell_of(EDITS["turn of 90"]), 600)
     moved = []
     for width in (1.0, 0.5, 0.1):
-        edit = Edit(INNER, OUTER, width=width).rotate((0, 0, 0.3))
+        edit = Edit.continuous(INNER, OUTER, shell=Flow(width=width)).rotate((0, 0, 0.3))
         q = shell_of(edit).to_canonical(p)[0]
         moved.append((np.abs(q - p).max(axis=1) > 0.0).mean())
     assert moved[0] == 1.0 > moved[1] > 2.0 * moved[2] > 0.0
@@ -233,14 +233,16 @@ def test_width_one_moves_all_of_the_shell_and_less_moves_less() -> None:
 
 def test_turns_beyond_180_degrees_are_their_shorter_turn() -> None:
     p = shell_points(shell_of(EDITS["turn of 90"]), 50)
-    long = shell_of(Edit(INNER, OUTER).rotate((0, 0, 1.6 * np.pi))).to_canonical(p)[0]
-    short = shell_of(Edit(INNER, OUTER).rotate((0, 0, -0.4 * np.pi))).to_canonical(p)[0]
+    long = shell_of(Edit.continuous(INNER, OUTER).rotate((0, 0, 1.6 * np.pi))).to_canonical(p)[0]
+    short = shell_of(Edit.continuous(INNER, OUTER).rotate((0, 0, -0.4 * np.pi))).to_canonical(p)[0]
     np.testing.assert_allclose(long, short, atol=1e-9)
 
 
 def test_stacks_go_both_ways() -> None:
-    small = Edit(Cage.box((0.5, 0.5, 0.5), 0.2), Cage.box((0.5, 0.5, 0.5), 0.7))  # in the other's outer cage
-    across = Edit(Cage.box((0.9, 0, 0), 0.5), Cage.box((0.9, 0, 0), 1.2))  # overlaps it
+    small = Edit.continuous(
+        Cage.box((0.5, 0.5, 0.5), 0.2), Cage.box((0.5, 0.5, 0.5), 0.7)
+    )  # in the other's outer cage
+    across = Edit.continuous(Cage.box((0.9, 0, 0), 0.5), Cage.box((0.9, 0, 0), 1.2))  # overlaps it
     turned = EDITS["turn of 90"]
     chain = [turned, small.rotate((0, 2, 0)), across.translate((0.2, 0.1, 0))]
     chain += [EDITS["corner after rotation"].scale(0.9), small.translate((0, 0.1, -0.1)), EDITS["shear"]]
@@ -257,17 +259,20 @@ def test_stacks_go_both_ways() -> None:
 
 PROBLEMS = [
     (
-        Edit(INNER, INNER.grown(1e-4)),
+        Edit.continuous(INNER, INNER.grown(1e-4)),
         "the flow shell has no room before any operation: the gap .* half-width",
     ),
     (
-        Edit(INNER, OUTER).translate((0.4999, 0, 0)),
+        Edit.continuous(INNER, OUTER).translate((0.4999, 0, 0)),
         r"the flow shell has no room: .* at least 0\.002 on every side; 0\.99 of this translation",
     ),
-    (Edit(INNER, OUTER).translate((0.6, 0, 0)), "outer cage must contain the inner cage: inner corner 1"),
+    (
+        Edit.continuous(INNER, OUTER).translate((0.6, 0, 0)),
+        "outer cage must contain the inner cage: inner corner 1",
+    ),
     (
         # The outer cage's top is a saddle; the turned cage's corners lie on its level lines, not its edges.
-        Edit(
+        Edit.continuous(
             Cage.box((0, 0, 0), 0.6, (0, 0, np.pi / 4)),
             OUTER.move_corner(5, (0, 0, -0.6)).move_corner(6, (0, 0, -0.6)),
         ).translate((0, 0, 0.19)),
@@ -275,13 +280,13 @@ PROBLEMS = [
     ),
     (
         # One cage with a corner at its opposite edge becomes another.
-        Edit(INNER.move_corner(2, (-0.05, -0.59, 0.02)), OUTER.grown(1.0))
+        Edit.continuous(INNER.move_corner(2, (-0.05, -0.59, 0.02)), OUTER.grown(1.0))
         .move_corner(2, (0.05, 0.59, -0.02))
         .move_corner(0, (0.29, 0.58, -0.53)),
         "the flow shell cannot follow the inner cage: it is bent too far",
     ),
     (
-        Edit(TWISTED, OUTER.grown(1.0)),
+        Edit.continuous(TWISTED, OUTER.grown(1.0)),
         "the flow shell cannot surround the inner cage: it is bent too far before any operation",
     ),
 ]
@@ -345,7 +350,7 @@ def test_safe_fraction_is_that_of_the_checks(edit: Edit, kind: int, seed: int) -
 def test_safe_fraction_where_an_edge_reaches_the_outer_cage_first() -> None:
     # The middle of the outer cage's top sags to z = 0.5 between two raised corners.
     sagging = OUTER.move_corner(5, (0, 0, -0.6)).move_corner(6, (0, 0, -0.6))
-    edit = Edit(Cage.box((0, 0, 0), 0.6, (0, 0, np.pi / 4)), sagging)
+    edit = Edit.continuous(Cage.box((0, 0, 0), 0.6, (0, 0, np.pi / 4)), sagging)
     operation = Translate((0, 0, 0.5))
     found = edit.safe_fraction(operation)
     assert found == pytest.approx(bisected(edit, operation), abs=1e-3)
@@ -366,7 +371,7 @@ def test_corners_along_an_operation_are_those_of_its_parts(kind: int, axes: Axes
 
 
 def test_safe_fraction_ends_at_the_outer_cage() -> None:
-    edit = Edit(INNER, OUTER).translate((1.0, 0, 0))
+    edit = Edit.continuous(INNER, OUTER).translate((1.0, 0, 0))
     # The gap of 0.5 less the 0.002 * 0.8 that must stay.
     assert edit.safe_fraction() == pytest.approx(0.5 - 0.002 * 0.8, abs=1.1e-3)
-    assert Edit(INNER, OUTER).rotate((0, 0, np.pi)).safe_fraction() == 1.0
+    assert Edit.continuous(INNER, OUTER).rotate((0, 0, np.pi)).safe_fraction() == 1.0

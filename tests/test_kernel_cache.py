@@ -19,10 +19,10 @@ import json
 import numpy as np
 from cagefield import Cage, Edit
 from cagefield.edits import EditStack
-from cagefield.edits.device import device_stack
+from cagefield.edits import device_stack
 
 inner = Cage.box((0, 0, 0), 0.5)
-edit = Edit(inner, inner.grown(0.5), shell="trilinear").translate((0.1, 0, 0))
+edit = Edit.continuous(inner, inner.grown(0.5), shell=Trilinear()).translate((0.1, 0, 0))
 packed = device_stack.DeviceStack.from_stack(EditStack([edit]))
 mapped = packed.to_canonical(np.zeros((1, 3)), np.ones((1, 3)))
 seen = device_stack.map_samples._primal.src_ll_cache_observations

@@ -14,7 +14,7 @@ from benchmarks.edits.mapped_photographs import MappedScene
 from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, Flow
 from cagefield.errors import SceneError
 from cagefield.geometry.cage import Cage
 from cagefield.images.metrics import psnr
@@ -139,7 +139,7 @@ def test_a_turned_part_is_seen_by_its_canonical_directions() -> None:
     """A box's faces keep the light and the highlights they had, as where light is carried along."""
     scene = scene_of(Primitive(Box((0.25, 0.2, 0.15), 0.02), GREY, gloss=(0.3, 9.0)))
     inner = Cage.box((0, 0, 0), 0.8)
-    edit = Edit(inner, inner.grown(0.5), shell="flow").rotate((0.2, 0.3, 0.9))
+    edit = Edit.continuous(inner, inner.grown(0.5), shell=Flow()).rotate((0.2, 0.3, 0.9))
     moved = scene.move("thing", rotate=(0.2, 0.3, 0.9), pivot=(0, 0, 0))
     frame = MappedScene(scene, exact(EditStack([edit]))).photograph(view(48, 0.4), background="white")
     carried, lit = (
@@ -156,7 +156,7 @@ def test_a_thin_rod_in_a_twisted_shell_is_not_missed() -> None:
     rod = Primitive(Cylinder(0.004, 0.9), GREY, pose_matrix((0.28, 0, 0))[None])
     scene = scene_of(rod, Primitive(Sphere(0.1), GREY, pose_matrix((0, 0, 0.5))[None]))
     inner = Cage.box((0, 0, 0), (0.8, 0.8, 0.5))
-    edit = Edit(inner, Cage.box((0, 0, 0), (1.5, 1.5, 1.5))).rotate((0, 0, np.radians(80)))
+    edit = Edit.continuous(inner, Cage.box((0, 0, 0), (1.5, 1.5, 1.5))).rotate((0, 0, np.radians(80)))
     mapping = exact(EditStack([edit]))
     # where the rod goes through the upper half of the shell
     camera = view(24, 0.06, (0.21, 0.18, 0.47))
@@ -173,7 +173,7 @@ def test_cuts_and_copies_have_the_surfaces_that_samples_have() -> None:
     """Maps that jump: half of a box is deleted, and the rest put beside it once more."""
     scene = scene_of(Primitive(Box((0.3, 0.3, 0.3), 0.05), GREY))
     cut = Edit.delete(Cage.box((0.25, 0, 0), (0.5, 0.8, 0.8)))
-    copy = Edit(Cage.box((-0.2, 0, 0), (0.38, 0.8, 0.8)), adjustment="discrete", keep_source=True)
+    copy = Edit.copy(Cage.box((-0.2, 0, 0), (0.38, 0.8, 0.8)))
     mapping = exact(EditStack([cut, copy.translate((0, 0.7, 0.1)).rotate((0, 0, 0.5))]))
     camera = view(40, 0.6)
     want, got = brute(scene, mapping, camera, 1e-3), met(scene, mapping, camera)
@@ -191,7 +191,7 @@ def test_cuts_and_copies_have_the_surfaces_that_samples_have() -> None:
 def test_a_thin_copy_in_open_space_is_not_stepped_over() -> None:
     """Before the copy a ray's sample is far from all surfaces, and knows nothing of the jump ahead."""
     scene = scene_of(Primitive(Box((0.004, 0.25, 0.25)), GREY, pose_matrix((-0.5, 0, 0))[None]))
-    copy = Edit(Cage.box((-0.5, 0, 0), (0.012, 0.6, 0.6)), adjustment="discrete", keep_source=True)
+    copy = Edit.copy(Cage.box((-0.5, 0, 0), (0.012, 0.6, 0.6)))
     mapping = exact(EditStack([copy.translate((1.0, 0.2, 0))]))
     camera = view(24, 0.6)
     frame = MappedScene(scene, mapping).photograph(camera, supersample=1)

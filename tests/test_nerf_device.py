@@ -25,7 +25,7 @@ from nerf_networks import small_field  # noqa: E402
 
 FAR = torch.device("meta")
 CAMERA = Camera.look_at((0.0, -4.0, 1.0), (0.0, 0.0, 0.0), width=6, height=5, fov_x=0.8)
-EDITS = EditStack([Edit(Cage.box((0, 0, 0), 0.4), adjustment="discrete").translate((0.2, 0, 0))])
+EDITS = EditStack([Edit.move(Cage.box((0, 0, 0), 0.4)).translate((0.2, 0, 0))])
 KINDS = [{}, {"lindisp": True}, {"ndc": (0.6, 0.5)}, {"bounded": True}]
 
 

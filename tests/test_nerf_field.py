@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cagefield.cameras.camera import Camera, turntable
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, Trilinear
 from cagefield.errors import FieldError
 from cagefield.fields.mlp import Linear, Mlp
 from cagefield.fields.nerf_field import NerfField
@@ -252,17 +252,21 @@ def test_rays_away_from_a_forward_facing_capture_see_nothing() -> None:
 
 
 def box_edit(**options) -> Edit:
-    return Edit(Cage.box((0, 0, 0), 0.5), Cage.box((0, 0, 0), 1.2), **options)
+    return Edit.continuous(Cage.box((0, 0, 0), 0.5), Cage.box((0, 0, 0), 1.2), **options)
+
+
+def box_move() -> Edit:
+    return Edit.move(Cage.box((0, 0, 0), 0.5))
 
 
 STACKS = {
-    "move": EditStack([box_edit(adjustment="discrete").translate((0.4, 0.1, 0.0)).rotate((0, 0, 0.4))]),
+    "move": EditStack([box_move().translate((0.4, 0.1, 0.0)).rotate((0, 0, 0.4))]),
     "delete": EditStack([Edit.delete(Cage.box((0.2, 0, 0), 0.4))]),
     "flow": EditStack([box_edit().rotate((0.2, 0.1, 0.6)).scale(0.8)]),
     "trilinear, then move": EditStack(
         [
-            box_edit(shell="trilinear").scale((1.2, 0.9, 1.1)),
-            box_edit(adjustment="discrete").translate((0, 0.5, 0)),
+            box_edit(shell=Trilinear()).scale((1.2, 0.9, 1.1)),
+            box_move().translate((0, 0.5, 0)),
         ]
     ),
 }
@@ -305,7 +309,7 @@ def test_moving_everything_with_the_camera_gives_the_same_picture(bounded, size)
     field = small_field(samples=(24, 32), bounded=bounded)
     shift = np.array([0.7, -0.3, 0.2])
     turn = 0.5
-    edit = Edit(Cage.box((0, 0, 0), size), adjustment="discrete").rotate((0, 0, turn)).translate(shift)
+    edit = Edit.move(Cage.box((0, 0, 0), size)).rotate((0, 0, turn)).translate(shift)
     R = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = R, shift

@@ -292,7 +292,7 @@ def test_an_imported_scene_has_voxels_cameras_and_the_original(scene, capsys) ->
 
 def test_exact_pictures_show_the_original_through_the_edits(scene) -> None:
     opened = Scene.open(scene)
-    edit = Edit(Cage.box((0, 0, 0), 12.0), adjustment="discrete").translate((0.4, 0, 0))
+    edit = Edit.move(Cage.box((0, 0, 0), 12.0)).translate((0.4, 0, 0))
     edited = opened.with_edits(EditStack([edit]))
     camera = opened.cameras["test"][0].resized(6, 6)
     found = edited.render(camera, exact=True)

@@ -84,7 +84,7 @@ def test_a_map_of_points_needs_no_runtime() -> None:
 import numpy as np
 from cagefield import Cage, Edit, EditStack
 cage = Cage.box((0, 0, 0), 1.0)
-edit = Edit(cage, cage.grown(0.5), lattice=None).translate((0.1, 0, 0))
+edit = Edit.continuous(cage, cage.grown(0.5)).translate((0.1, 0, 0))
 moved = EditStack([edit]).to_canonical(np.array([[0.1, 0.0, 0.0]]), np.array([[0.0, 0.0, 1.0]]))
 np.testing.assert_allclose(moved.points, [[0.0, 0.0, 0.0]], atol=1e-9)
 """
@@ -119,9 +119,7 @@ def test_wheel_includes_stubs_and_the_type_marker() -> None:
 
 
 def test_kernel_modules_print_nothing() -> None:
-    done = in_new_process(
-        "import cagefield.edits.device.device_stack, cagefield.rendering.voxels.kernels.march"
-    )
+    done = in_new_process("import cagefield.edits.device_stack, cagefield.rendering.voxels.kernels.march")
     assert done.stdout == done.stderr == ""
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from cagefield.completion.pasting.paste_composite import composite_paste
 from cagefield.completion.pasting.paste_content import SourceContent, extract_content
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, PreparedEdit, PreparedStack
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.fields.voxel_layers import BRICK_VERTICES
 from cagefield.geometry.cage import Cage
@@ -32,29 +32,35 @@ def page() -> Iterator[FieldPage]:
         yield opened
 
 
-def patched(field: VoxelField, edit: Edit, *, part: bool, seed: int = 0) -> Edit:
-    return edit.replace(patch=patch_by_hand(field, edit.inner, part=part, seed=seed))
+def patched(field: VoxelField, edit: Edit, *, part: bool, seed: int = 0) -> PreparedEdit:
+    return PreparedEdit(edit, patch_by_hand(field, edit.inner, part=part, seed=seed))
 
 
-def stack(field: VoxelField, name: str) -> EditStack:
+def copied(by: tuple[float, float, float], moved: PreparedEdit) -> PreparedEdit:
+    """A copy, elsewhere, that shows the patch of a move."""
+    operations = MOVED.translate(by).operations
+    return PreparedEdit(Edit.copy(MOVED.inner, operations=operations, **MOVED.shared_options), moved.patch)
+
+
+def stack(field: VoxelField, name: str) -> PreparedStack:
     """Stacks with patches: their parts' layers, an edit before and one after, layers of the same content."""
     moved = patched(field, MOVED, part=True)
     gone = patched(field, GONE, part=False, seed=3)
-    again = MOVED.translate((-0.3, 0.0, -0.4)).replace(patch=moved.patch, keep_source=True)
+    again = copied((-0.3, 0.0, -0.4), moved)
     edits = {
         "deleted": [gone],
         "after another": [TURNED, moved],
         "two and another": [gone, moved, again, TURNED.translate((0.1, 0.0, 0.0))],
     }
-    return EditStack(edits[name])
+    return PreparedStack(edits[name])
 
 
-def check_patched(page: FieldPage, field: VoxelField, edits: EditStack) -> Renderer:
+def check_patched(page: FieldPage, field: VoxelField, edits: PreparedStack) -> Renderer:
     """The page's picture is the kernel's, and neither that without patches nor that without edits."""
     seen = camera(field.contracted)
     renderer = Renderer(field, edits)
     ours = renderer.render(seen, normals=True)
-    bare = Renderer(field, EditStack(edit.replace(patch=None) for edit in edits)).render(seen)
+    bare = Renderer(field, EditStack(step.edit for step in edits)).render(seen)
     assert ours is not None and bare is not None
     assert psnr(ours.rgb, bare.rgb) < 30.0
     page.edit(None)
@@ -81,11 +87,13 @@ def test_the_page_draws_pastes_as_the_kernel_does(page: FieldPage, contracted: b
     field, other, seen = lumps(1, contracted), lumps(2, False, seed=9), camera(contracted)
     cage = Cage.box((0.1, 0.0, 0.0), 0.9)
     shown = extract_content(SourceContent(other, EditStack()), cage, field)
-    edit = Edit.paste("other", cage).scale(0.6).rotate((0.2, 0.0, 0.7)).replace(pasted=shown)
+    edit = Edit.paste("other", cage).scale(0.6).rotate((0.2, 0.0, 0.7))
     first = edit.translate((0.1, -0.6, 0.1) if contracted else (-0.5, 0.3, 0.2))
-    first = first.replace(pasted=composite_paste(field, EditStack(), first))
-    assert first.pasted is not shown
-    renderer = Renderer(field, EditStack([TURNED, first, edit.translate((0.6, -0.2, 0.3))]))
+    both = composite_paste(field, EditStack(), first, shown)
+    assert both is not shown
+    second = edit.translate((0.6, -0.2, 0.3))
+    pastes = PreparedEdit(first, pasted=both), PreparedEdit(second, pasted=shown)
+    renderer = Renderer(field, PreparedStack([TURNED, *pastes]))
     page.edit(None)
     page.load(encode_page_field(field))
     page.edit(encode_page_edits(renderer))
@@ -96,7 +104,7 @@ def test_the_page_draws_pastes_as_the_kernel_does(page: FieldPage, contracted: b
 
 def test_the_page_draws_patches_as_the_oracle_does(page: FieldPage) -> None:
     field, seen = lumps(2, False), camera(False)
-    edits = EditStack([TURNED, patched(field, MOVED, part=True)])
+    edits = PreparedStack([TURNED, patched(field, MOVED, part=True)])
     page.edit(None)
     # Samples as close as the oracle's: cuts are seen at the first sample behind them.
     page.load(encode_page_field(field, step=0.1))
@@ -110,13 +118,13 @@ def test_the_page_draws_patches_as_the_oracle_does(page: FieldPage) -> None:
 def test_a_page_is_sent_layers_once(page: FieldPage) -> None:
     field, seen = lumps(1, False), camera(False)
     moved = patched(field, MOVED, part=False)
-    first = Renderer(field, EditStack([moved]))
+    first = Renderer(field, PreparedStack([moved]))
     whole = encode_changed_edits(first)
     header, arrays = unpack(whole.data, MAGIC, VERSION, "edits")
     assert {"layer.0.box", "layer.0.cells", "layer.0.sh"} <= set(arrays)
     assert header["layers"][0]["key"] in whole.keys
     # The cage goes on, what it left stays: nothing of the layer is sent or uploaded.
-    there = first.with_edits(EditStack([moved.translate((0.05, 0.0, 0.0))]))
+    there = first.with_edits(PreparedStack([PreparedEdit(MOVED.translate((0.05, 0.0, 0.0)), moved.patch)]))
     change = encode_changed_edits(there, whole.keys)
     assert set(unpack(change.data, MAGIC, VERSION, "edits")[1]) == {"rows", "occupancy"}
     page.edit(None)
@@ -127,11 +135,11 @@ def test_a_page_is_sent_layers_once(page: FieldPage) -> None:
     check_alike(there.render(seen, normals=True), page.draw(seen))
     # The same content in two edits, at places that are not the ones of before.
     twice = first.with_edits(
-        EditStack(
+        PreparedStack(
             [
                 patched(field, GONE, part=False),
                 moved,
-                MOVED.translate((-0.3, 0.0, -0.4)).replace(patch=moved.patch, keep_source=True),
+                copied((-0.3, 0.0, -0.4), moved),
             ]
         )
     )
@@ -160,7 +168,7 @@ def test_textures_grow_for_layers_up_to_the_memory(page: FieldPage) -> None:
     field, seen = lumps(0, False), camera(False)
     cages = [Cage.box((x, y, 0.0), 0.3) for x in (-0.5, 0.5) for y in (-0.4, 0.4)]
     edits = EditStack(
-        Edit.delete(cage).replace(patch=patch_by_hand(field, cage, part=False, margin=0.4, seed=n))
+        PreparedEdit(Edit.delete(cage), patch_by_hand(field, cage, part=False, margin=0.4, seed=n))
         for n, cage in enumerate(cages)
     )
     renderer = Renderer(field, edits)

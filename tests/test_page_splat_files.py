@@ -82,8 +82,8 @@ def test_splats_less_what_goes_and_what_comes_are_the_edited_ones(
 ) -> None:
     field = random_splats(300, 1)
     field = dataclasses.replace(field, log_scales=field.log_scales - 1.5)
-    twisted = Edit(CAGE, CAGE.grown(0.4)).rotate((0.3, 0.0, 0.9)).scale(0.9)
-    copied = Edit(Cage.box((0.5, 0.5, 0.0), 0.5), adjustment="discrete", keep_source=True)
+    twisted = Edit.continuous(CAGE, CAGE.grown(0.4)).rotate((0.3, 0.0, 0.9)).scale(0.9)
+    copied = Edit.copy(Cage.box((0.5, 0.5, 0.0), 0.5))
     edits = EditStack([twisted, copied.translate((0.6, 0.0, 0.3)), Edit.delete(Cage.box((-0.8,) * 3, 0.3))])
     split = split_of(field, edits)
     assert split is not None
@@ -134,7 +134,7 @@ def test_discs_and_empty_fields_are_refused() -> None:
 @pytest.mark.parametrize(("edits", "packed"), [(False, False), (True, False), (True, True)])
 def test_cut_and_garbled_files_are_refused_in_a_line(edits: bool, packed: bool) -> None:
     field = random_splats(30, 1)
-    edit = Edit(CAGE, adjustment="discrete").translate((1.0, 0.0, 0.0)) if packed else Edit.delete(CAGE)
+    edit = Edit.move(CAGE).translate((1.0, 0.0, 0.0)) if packed else Edit.delete(CAGE)
     changed = changed_splats(field, EditStack([edit]))
     whole = encode_page_splat_edits(field, changed, packed=packed) if edits else encode_page_splats(field)
     decode = decode_page_splat_edits if edits else decode_page_splats

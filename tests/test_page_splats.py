@@ -12,7 +12,7 @@ import pytest
 
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion.splat_patch import build_splat_patch
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, PreparedEdit, PreparedStack
 from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats.splat_files import read_splats
 from cagefield.geometry.cage import Cage
@@ -151,10 +151,7 @@ def test_a_drag_of_many_splats_is_unpacked_and_sorted_beside_the_page(page: Fiel
     field = splats(0, 33_000)
     field = dataclasses.replace(field, log_scales=field.log_scales - 1.5)
     page.load(encode_page_splats(field))
-    turned = [
-        Edit(Cage.box((0, 0, 0), (2.2,) * 3), adjustment="discrete").rotate((0.0, angle, 0.0))
-        for angle in (0.8, 1.6)
-    ]
+    turned = [Edit.move(Cage.box((0, 0, 0), (2.2,) * 3)).rotate((0.0, angle, 0.0)) for angle in (0.8, 1.6)]
     files = [edited_unsplit(field, EditStack([edit])) for edit in turned]
     # Large enough for the worker, and most splats are in it.
     assert all(len(file) > 1 << 20 for file in files)
@@ -252,15 +249,18 @@ def test_eight_bits_do_where_there_are_no_floats(page: FieldPage) -> None:
 
 
 INNER, OUTER = Cage.box((0.1, 0.0, 0.0), (0.9, 0.8, 0.7)), Cage.box((0.1, 0.0, 0.0), (1.9, 1.6, 1.5))
-TWISTED = Edit(INNER, OUTER).rotate((0.1, 0.2, 0.9)).scale((1.2, 0.7, 1.0)).move_corner(7, (0.2, 0.1, 0.1))
-MOVED = Edit(Cage.box((0.6, 0.5, 0.3), (1.0, 0.9, 0.9)), adjustment="discrete").translate((0.0, -0.5, 0.8))
+TWISTED = (
+    Edit.continuous(INNER, OUTER)
+    .rotate((0.1, 0.2, 0.9))
+    .scale((1.2, 0.7, 1.0))
+    .move_corner(7, (0.2, 0.1, 0.1))
+)
+MOVED = Edit.move(Cage.box((0.6, 0.5, 0.3), (1.0, 0.9, 0.9))).translate((0.0, -0.5, 0.8))
 COPIED = (
-    Edit(Cage.box((0.5, 0.3, 0.2), (0.6, 0.5, 0.6)), adjustment="discrete", keep_source=True)
-    .rotate((0.0, 0.9, 0.0))
-    .translate((0.2, -0.4, 0.7))
+    Edit.copy(Cage.box((0.5, 0.3, 0.2), (0.6, 0.5, 0.6))).rotate((0.0, 0.9, 0.0)).translate((0.2, -0.4, 0.7))
 )
 GONE = Edit.delete(Cage.box((0.6, 0.5, 0.3), (0.9, 0.9, 1.0)))
-STRETCHED = Edit(INNER, adjustment="discrete").scale(1.6)
+STRETCHED = Edit.move(INNER).scale(1.6)
 STACKS = {"moved": [MOVED], "twisted and deleted": [GONE, TWISTED], "copied": [TWISTED, COPIED]}
 
 
@@ -284,7 +284,7 @@ def test_the_page_draws_edits_as_the_rasteriser_does(
 
 def test_the_page_fills_and_relights_as_the_rasteriser_does(page: FieldPage) -> None:
     field, edit = room(True), Edit.delete(cage())
-    edits = EditStack([edit.replace(patch=build_splat_patch(field, EditStack(), edit, LIGHT))])
+    edits = PreparedStack([PreparedEdit(edit, build_splat_patch(field, EditStack(), edit, LIGHT))])
     ours, bare = (
         SplatRenderer(field, each).render(camera(), normals=True) for each in (edits, EditStack([edit]))
     )
@@ -315,7 +315,7 @@ def test_edits_of_other_splats_are_refused(page: FieldPage) -> None:
 
 def test_edits_beyond_the_memory_are_refused(page: FieldPage) -> None:
     field = splats(0, 100)
-    copies = EditStack([Edit(Cage.box((0, 0, 0), (2.2,) * 3), keep_source=True, adjustment="discrete")])
+    copies = EditStack([Edit.copy(Cage.box((0, 0, 0), (2.2,) * 3))])
     copies = EditStack([edit.translate((3.0, 0.0, 0.0)) for edit in copies])
     # 100 splats take 100 (32 + 68) bytes, and as many copies 100 (64 + 68) more.
     said = page.page.evaluate(

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion.pasting.paste_content import content_box
 from cagefield.completion.surfaces.grid_block import extract_block
-from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
+from cagefield.edits import Edit, EditStack, PreparedStack, dump_edits, parse_edits
 from cagefield.edits.operations import Rotate, Scale
 from cagefield.errors import EditError, EditFileError, SceneError
 from cagefield.fields.analytic import AnalyticField, GaussianBlob, UniformSphere
@@ -145,7 +145,7 @@ def test_vertices_are_copied_as_they_are(folder: Path) -> None:
     block = extract_block(other, EditStack(), np.array([[-0.2, -0.2, -0.3], [0.4, 0.4, 0.3]]))
     every = np.ones(block.shape, bool)
     at = block.positions(every) + np.array([0.6, 0.0, 0.0])
-    mapped = EditStack([edit]).to_canonical(at)
+    mapped = PreparedStack([edit]).to_canonical(at)
     assert (mapped.layer == 1).all()
     stretch = np.cbrt(np.linalg.det(mapped.jacobian))
     sigma, _ = edit.part(mapped.points, np.tile((0.0, 0.0, 1.0), (len(at), 1)))
@@ -164,7 +164,7 @@ def test_kernel_and_oracle_show_the_same(folder: Path, contracted: bool) -> None
         parts = (part[kept] for part in (field.vertices, field.density, field.sh))
         field = VoxelField(0.5 * field.bounds, field.resolution, *parts, contracted=True)
         scene = replace(scene, field=field)
-    after = Edit(Cage.box(BY, 1.2), adjustment="discrete", keep_source=True)
+    after = Edit.copy(Cage.box(BY, 1.2))
     stack = scene.with_edits(
         EditStack([pasted(0.7), after.translate((-0.8, 0.0, 1.1)).replace(relight="none")])
     ).patched_edits
@@ -178,7 +178,7 @@ def test_kernel_and_oracle_show_the_same(folder: Path, contracted: bool) -> None
 def test_the_other_scene_is_pasted_as_it_is_edited(folder: Path, tmp_path: Path) -> None:
     """Its edits are done, those that stretch keep opacity, and so are pastes of its own."""
     thing = Scene.open(folder / "thing")
-    grown = Edit(cage(1.6), adjustment="discrete", fill="none", relight="none").scale(1.4)
+    grown = Edit.move(cage(1.6), fill="none", relight="none").scale(1.4)
     thing.with_edits(EditStack([grown])).save(tmp_path / "grown")
     scene = Scene.open(folder / "place")
     wide = about_origin(Cage.box((0.15, 0.15, 0.0), 2.2))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from cagefield.cameras.camera import Camera
 from cagefield.completion.splat_patch import build_splat_patch
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, PreparedEdit, PreparedStack
 from cagefield.edits.operations import Rotate
 from cagefield.errors import EditError
 from cagefield.exporting import edited_splats
@@ -57,7 +58,9 @@ def with_heap(folder: Path, *edits: Edit) -> Scene:
 
 def by_hand(heap: SplatField, edit: Edit) -> SplatField:
     """A field's splats moved by an edit of their own scene."""
-    return baked_splats(heap, EditStack([edit.replace(source=None, keep_source=False)]))
+    return baked_splats(
+        heap, EditStack([Edit.move(edit.inner, operations=edit.operations, relight=edit.relight)])
+    )
 
 
 @pytest.mark.parametrize("source", ["../heap", "../heap.ply"])
@@ -84,8 +87,8 @@ def test_a_paste_is_the_picture_of_both(folder: Path, source: str) -> None:
 
 def test_what_is_made_is_the_oracles(folder: Path) -> None:
     """With an edit before and one after, copies of a paste, and two pastes of one scene."""
-    before = Edit(Cage.box((0.3, 0.0, 0.0), 0.6), adjustment="discrete").translate((0.0, 0.0, 1.0))
-    after = Edit(Cage.box(BY, 1.0), adjustment="discrete", keep_source=True).translate((0.0, 1.5, 0.0))
+    before = Edit.move(Cage.box((0.3, 0.0, 0.0), 0.6)).translate((0.0, 0.0, 1.0))
+    after = Edit.copy(Cage.box(BY, 1.0)).translate((0.0, 1.5, 0.0))
     again = pasted().translate((0.0, -2.5, 0.0))
     scene = with_heap(folder, before, pasted(), after, again)
     edits = scene.patched_edits
@@ -139,8 +142,9 @@ def test_surroundings_get_a_shadow(tmp_path: Path) -> None:
     edit = Edit.paste("../box", cage()).translate((-0.5, 0.25, 0.0))
     (ready,) = bare.with_edits(EditStack([edit.replace(relight="none")])).patched_edits
     truth = seen(room(True, by=(-0.5, 0.25)), EditStack())
-    shaded = ready.replace(patch=build_splat_patch(bare.field, EditStack(), ready, LIGHT))  # type: ignore[arg-type]
-    plain, both = (psnr(seen(bare.field, EditStack([e])), truth) for e in (ready, shaded))  # type: ignore[arg-type]
+    patch = build_splat_patch(bare.field, EditStack(), edit, LIGHT, pasted=ready.pasted)  # type: ignore[arg-type]
+    shaded = replace(ready, patch=patch)
+    plain, both = (psnr(seen(bare.field, PreparedStack([e])), truth) for e in (ready, shaded))  # type: ignore[arg-type]
     assert both > plain + 3.0
 
 
@@ -149,11 +153,11 @@ def test_what_an_earlier_edit_was_filled_with_stays_beside_a_paste(tmp_path: Pat
     Scene(room(True)).save(tmp_path / "box")
     scene = Scene(room(True), folder=tmp_path / "floor")
     gone = Edit.delete(cage())
-    gone = gone.replace(patch=build_splat_patch(scene.field, EditStack(), gone, LIGHT))  # type: ignore[arg-type]
+    gone = PreparedEdit(gone, build_splat_patch(scene.field, EditStack(), gone, LIGHT))  # type: ignore[arg-type]
     far = Edit.paste("../box", cage()).replace(relight="none").translate((9.0, 0.0, 0.0))
     (far,) = scene.with_edits(EditStack([far])).patched_edits
-    alone, both = (seen(scene.field, EditStack(edits)) for edits in ([gone], [gone, far]))  # type: ignore[arg-type]
-    assert psnr(both, alone) > 60.0 > psnr(seen(scene.field, EditStack([far])), alone) + 20.0  # type: ignore[arg-type]
+    alone, both = (seen(scene.field, PreparedStack(edits)) for edits in ([gone], [gone, far]))  # type: ignore[arg-type]
+    assert psnr(both, alone) > 60.0 > psnr(seen(scene.field, PreparedStack([far])), alone) + 20.0  # type: ignore[arg-type]
 
 
 def test_kinds_that_do_not_go_together(folder: Path, tmp_path: Path) -> None:

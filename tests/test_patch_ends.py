@@ -42,7 +42,7 @@ def handle(held: bool) -> VoxelField:
 @pytest.mark.parametrize("keep_source", [True, False])
 def test_the_face_of_a_part_goes_on_where_it_was_held(keep_source: bool) -> None:
     inner = Cage.box((-0.4, 0.0, -0.3), (0.72, 0.72, 0.48))
-    edit = Edit(inner, adjustment="discrete", keep_source=keep_source, relight="none")
+    edit = (Edit.copy if keep_source else Edit.move)(inner, relight="none")
     edit = edit.translate((0.85, 0.0, 0.0))
     camera = Camera.look_at((0.45, -0.9, 1.6), (0.45, 0.0, -0.1), width=48, height=48, fov_x=0.35)
 
@@ -119,7 +119,7 @@ def test_what_a_lifted_part_hid_takes_the_colours_around() -> None:
     rows[under] += chance.uniform(-0.5, 0.5, (int(under.sum()), 1, 3)).astype(np.float32)
     field = dataclasses.replace(field, sh=rows)
     strong = LightModel(LIGHT.radii, tuple(1.3 * w for w in LIGHT.weights))
-    edit = Edit(INNER, OUTER, lattice=32).translate((0.0, 0.0, 0.35))
+    edit = Edit.continuous(INNER, OUTER, lattice=32).translate((0.0, 0.0, 0.35))
     light = relight_voxels(field, EditStack(), edit, strong)
     assert light is not None
     block = extract_block(field, EditStack([light]), field.bounds)

@@ -20,7 +20,7 @@ from cagefield.completion.surfaces.footprint import Footprint
 from cagefield.completion.surfaces.grid_block import extract_block, interpolate_field
 from cagefield.completion.surfaces.support_plane import Support
 from cagefield.completion.surfaces.visibility import render_visibility
-from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
+from cagefield.edits import Edit, EditStack, PreparedEdit, PreparedStack, dump_edits, parse_edits
 from cagefield.edits.options import Clone
 from cagefield.edits.patch import Patch
 from cagefield.errors import EditError, EditFileError
@@ -151,7 +151,7 @@ def test_the_fit_finds_the_shade_and_none_where_none_is(scenes: tuple[Scene, Sce
 def test_shadows_go_along(scenes: tuple[Scene, Scene]) -> None:
     """The box at its new place shades the floor there, about as much as where it stood."""
     scene, truth = scenes
-    moved = Edit(cage(), adjustment="discrete").translate((-0.8, 0.0, 0.0))
+    moved = Edit.move(cage()).translate((-0.8, 0.0, 0.0))
 
     def beside(edit: Edit, x: float) -> float:
         """How bright the floor is beside the box at x, over what it is without a box."""
@@ -172,13 +172,13 @@ def test_switched_off_nothing_is_patched(scenes: tuple[Scene, Scene]) -> None:
     plain = Renderer(scene.field, EditStack([edit])).render(cameras()[0])  # type: ignore[arg-type]
     own = scene.with_edits(EditStack([edit])).render(cameras()[0])
     assert plain is not None and np.array_equal(plain.rgb, own.rgb)
-    continuous = Edit(cage(), cage().grown(0.1)).translate((0.05, 0.0, 0.0))
+    continuous = Edit.continuous(cage(), cage().grown(0.1)).translate((0.05, 0.0, 0.0))
     assert not needs_patch(continuous) and not needs_patch(Edit.delete(cage()).replace(enabled=False))
 
 
 def test_patches_are_kept_while_a_cage_is_dragged(scenes: tuple[Scene, Scene]) -> None:
     scene, _ = scenes
-    edit = Edit(cage(), adjustment="discrete").translate((-0.5, 0.0, 0.0))
+    edit = Edit.move(cage()).translate((-0.5, 0.0, 0.0))
     further = edit.translate((-0.2, 0.0, 0.0))
     first, second = (scene.patcher.prepare([e], moving=True)[0].patch for e in (edit, further))
     assert first is second and first is not None and first.part is None
@@ -219,9 +219,9 @@ def test_kernel_and_oracle_read_the_same_layers(contracted: bool) -> None:
         other(field, box, (0.1, 0.6, 0.2)),
         other(field, box, (0.2, 0.2, 0.9)),
     )
-    edit = Edit(inner, adjustment="discrete").translate((-size, 0.0, 0.1 * size)).rotate((0.0, 0.0, 0.4))
-    earlier = Edit(inner, inner.grown(0.2 * size), lattice=16).translate((0.05 * size, 0.0, 0.0))
-    stack = EditStack([earlier, edit.replace(patch=patch)])
+    edit = Edit.move(inner).translate((-size, 0.0, 0.1 * size)).rotate((0.0, 0.0, 0.4))
+    earlier = Edit.continuous(inner, inner.grown(0.2 * size), lattice=16).translate((0.05 * size, 0.0, 0.0))
+    stack = PreparedStack([earlier, PreparedEdit(edit, patch)])
     assert len(set(stack.places)) == 2 and min(stack.places) >= max(field.resolution) - BRICK_VERTICES
     camera = Camera.look_at(
         (1.2 * size, -2.5 * size, 1.4 * size), tuple(box.mean(axis=0)), width=40, height=40, fov_x=0.7
@@ -261,7 +261,7 @@ def test_layers_lie_behind_the_field_and_apart() -> None:
 
 def test_a_patch_over_an_earlier_edit_shows_what_that_made() -> None:
     field = room(True)
-    earlier = Edit(cage(), adjustment="discrete").translate((-0.7, 0.0, 0.0)).rotate((0.0, 0.0, 0.5))
+    earlier = Edit.move(cage()).translate((-0.7, 0.0, 0.0)).rotate((0.0, 0.0, 0.5))
     block = extract_block(field, EditStack([earlier]), np.array([[-0.9, -0.4, -0.7], [0.5, 0.4, 0.3]]))
     mapped = EditStack([earlier]).to_canonical(block.positions(np.ones(block.shape, bool)))
     raw, _ = interpolate_field(field, mapped.points)
@@ -311,8 +311,8 @@ def test_strange_cages_are_patched_without_a_traceback(scenes: tuple[Scene, Scen
     ):
         for edit in (
             Edit.delete(odd),
-            Edit(odd, adjustment="discrete").translate((-0.4, 0.1, 0.3)),
-            Edit(odd, adjustment="discrete", keep_source=True).scale(0.5),
+            Edit.move(odd).translate((-0.4, 0.1, 0.3)),
+            Edit.copy(odd).scale(0.5),
         ):
             assert np.isfinite(scene.with_edits(EditStack([edit])).render(cameras()[0]).rgb).all()
 
@@ -334,7 +334,7 @@ def test_options_are_read_and_written(tmp_path: Path) -> None:
     with pytest.raises(EditFileError, match=r'fill must be one of surroundings, none, got "grass"'):
         parse_edits(text.replace("fill: none", "fill: grass"))
     with pytest.raises(EditError, match="relight must be one of"):
-        Edit(cage(), adjustment="discrete", relight="moon")  # type: ignore[arg-type]
+        Edit.move(cage(), relight="moon")  # type: ignore[arg-type]
 
 
 def test_openness_needs_weights() -> None:
@@ -364,7 +364,7 @@ def test_the_rim_of_a_part_blends_into_what_it_is_put_into() -> None:
     above = Camera.look_at((0.35, 0.3, 1.5), (0.35, 0.31, FLOOR), width=64, height=64, fov_x=0.4)
     steps = {}
     for feather in (0.0, 1.0, 4.0):
-        edit = Edit(piece, adjustment="discrete", keep_source=True, relight="none", feather=feather)
+        edit = Edit.copy(piece, relight="none", feather=feather)
         moved = EditStack([edit.translate((0.75, 0.7, 0.0))])
         assert parse_edits(dump_edits(moved)) == moved
         picture = scene.with_edits(moved).render(above).rgb
@@ -375,4 +375,4 @@ def test_the_rim_of_a_part_blends_into_what_it_is_put_into() -> None:
 def test_widths_of_seams_that_make_no_sense_are_refused() -> None:
     for feather in (-1.0, 9.0, float("nan")):
         with pytest.raises(EditError, match="feather must be 0"):
-            Edit(cage(), adjustment="discrete", feather=feather)
+            Edit.move(cage(), feather=feather)

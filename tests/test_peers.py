@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache
 from itertools import product
 
@@ -12,11 +12,11 @@ from benchmarks.edits.baselines import PEERS, HarmonicShell
 from benchmarks.edits.baselines.harmonic import RESOLUTION, conjugate_gradients
 from benchmarks.edits.baselines.mean_value import ClosedMesh, cube_surface
 from benchmarks.edits.distortion import distortion, shell_points
-from benchmarks.edits.methods import MAPS, METHODS, check_known, exact_map, peers
+from benchmarks.edits.methods import MAPS, METHODS, Peer, check_known, exact_map
 from scipy import sparse
 
-from cagefield.edits import Edit, EditStack
-from cagefield.edits.device.device_stack import DeviceStack
+from cagefield.edits import Edit, EditStack, Flow
+from cagefield.edits.device_stack import DeviceStack
 from cagefield.errors import CagefieldError, EditError
 from cagefield.geometry import hexahedron
 from cagefield.geometry.cage import Cage
@@ -26,7 +26,7 @@ from cagefield.warps.hexahedron_map import HexahedronMap
 pytestmark = pytest.mark.nightly
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
-EDIT = Edit(INNER, OUTER)
+EDIT = Edit.continuous(INNER, OUTER)
 MOVED = EDIT.translate((0.1, 0.05, -0.05))
 TURNED = EDIT.rotate((0.1, 0.2, 0.5)).scale((1.2, 0.9, 1.1))
 BENT = EDIT.move_corner(7, (0.2, 0.1, 0.15)).move_edge((0, 1), (0.0, -0.1, 0.05))
@@ -180,7 +180,7 @@ def test_harmonic_layers_in_closed_form() -> None:
     """Between two plates the harmonic displacement is linear; far from the ends a slab is such a pair."""
     outer = Cage.box((0, 0, 0), (4.0, 4.0, 0.8))
     inner = Cage.box((0, 0, 0), (3.9, 3.9, 0.2))
-    edit = Edit(inner, outer).translate((0, 0, 0.1))
+    edit = Edit.continuous(inner, outer).translate((0, 0, 0.1))
     # 33 nodes, 0.025 apart: the plates at -0.4, 0.0, 0.2 and 0.4 are rows of them
     harmonic = HarmonicShell(HexahedronMap(inner, edit.deformed), outer, 33)
     z = np.linspace(-0.4, 0.4, 41)
@@ -241,27 +241,12 @@ def test_conjugate_gradients_solve() -> None:
     np.testing.assert_allclose(A @ x, right, atol=1e-5)
 
 
-@pytest.fixture
-def named() -> Iterator[None]:
-    """The peers by name, while the test runs."""
-    with peers():
-        yield
-
-
-def test_peers_have_names_in_their_context_only() -> None:
-    with peers(), peers():
-        edit = TURNED.replace(shell="harmonic")
-    with pytest.raises(EditError, match="shell must be one of flow, trilinear, got"):
-        edit.replace(name="again")
-
-
-@pytest.mark.usefixtures("named")
 @pytest.mark.parametrize("name", PEERS)
 def test_an_edit_takes_a_peer_by_name(name: str) -> None:
     """phi inside, the identity outside; and the kernel reads the same from a lattice of the peer's map."""
     p = np.random.default_rng(6).uniform(-1.2, 1.2, (3000, 3))
     exact = TURNED.exact_warp.to_canonical(p)
-    edit = TURNED.replace(shell=name)
+    edit = TURNED.replace(shell=Peer(name))
     mapped = edit.exact_warp.to_canonical(p)
     in_shell = OUTER.contains(p) & ~TURNED.deformed.contains(p)
     np.testing.assert_array_equal(mapped.points[~in_shell], exact.points[~in_shell])
@@ -282,21 +267,19 @@ def test_an_edit_takes_a_peer_by_name(name: str) -> None:
         edit.exact_warp.to_deformed(p)
 
 
-@pytest.mark.usefixtures("named")
 def test_methods_change_shells_alone() -> None:
-    stack = EditStack([Edit.delete(INNER), TURNED.replace(width=0.5)])
+    stack = EditStack([Edit.delete(INNER), TURNED.replace(shell=Flow(width=0.5))])
     for name, method in METHODS.items():
         first, second = method.of_all(stack)
         assert first == stack[0]
-        assert (second.shell, second.lattice) == (method.shell, method.lattice), name
+        assert (second.shell.name, second.lattice) == (method.shell, method.lattice), name
         assert second.operations == TURNED.operations
-        assert second.width == (0.5 if method.shell == "flow" else 1.0)
+        assert method.shell != "flow" or second.shell == Flow(width=0.5)
 
 
 # -- folding and distortion --------------------------------------------------------------------------------
 
 
-@pytest.mark.usefixtures("named")
 def test_peers_fold_under_large_turns_and_not_under_small_ones() -> None:
     for name in PEERS:
         small, large = (EDIT.rotate((0, 0, np.radians(deg))) for deg in (15, 90))
@@ -344,7 +327,7 @@ def test_points_of_the_shell() -> None:
     with pytest.raises(CagefieldError, match='edit "" has no outer cage'):
         shell_points(Edit.delete(INNER), 5)
     with pytest.raises(CagefieldError, match="fills its outer cage; leave a gap"):
-        shell_points(Edit(INNER, INNER), 5)
+        shell_points(Edit.continuous(INNER, INNER), 5)
 
 
 def test_methods_that_cannot_be() -> None:

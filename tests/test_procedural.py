@@ -411,7 +411,7 @@ def test_really_moved_part_is_what_a_discrete_edit_makes(name, part, motion):
     """The field of the moved scene, its light carried along, equals the field seen through the edit."""
     scene = procedural_scene(name)
     center, size = scene.part_box(part, margin=0.002)
-    edit = Edit(Cage.box(center, size), adjustment="discrete").scale(motion.get("scale", 1.0))
+    edit = Edit.move(Cage.box(center, size)).scale(motion.get("scale", 1.0))
     edit = edit.rotate(motion.get("rotate", (0, 0, 0))).translate(motion["translate"])
     moved = scene.move(part, **motion).with_modeled_light()
     low, high = moved.part_bounds(part) - 0.05 * np.array([[1], [-1]])

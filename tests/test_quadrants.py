@@ -15,11 +15,11 @@ STARTED = """
 import json, sys
 import numpy as np
 from cagefield import Cage, Edit
-from cagefield.edits import EditStack
-from cagefield.edits.device.device_stack import DeviceStack
+from cagefield.edits import EditStack, Trilinear
+from cagefield.edits.device_stack import DeviceStack
 
 inner = Cage.box((0, 0, 0), 0.5)
-stack = EditStack([Edit(inner, inner.grown(0.5), shell="trilinear").translate((0.1, 0, 0))])
+stack = EditStack([Edit.continuous(inner, inner.grown(0.5), shell=Trilinear()).translate((0.1, 0, 0))])
 points, along = np.full((1, 3), 0.1, np.float32), np.ones((1, 3), np.float32)
 mapped = DeviceStack.from_stack(stack).to_canonical(points, along)[0]
 found = ["torch" in sys.modules, mapped.tolist()]

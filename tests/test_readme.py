@@ -10,6 +10,7 @@ import pytest
 
 from cagefield import Scene
 from cagefield.cli import parse
+from cagefield.edits import Copy, Delete
 from cagefield.edits.edit_files import parse_edits
 from scenes import ball_scene
 
@@ -37,7 +38,7 @@ def test_edit_files_show_every_kind_of_edit() -> None:
     text, _, moved = blocks("docs/how-to/edit-files.md", "yaml")
     edits = parse_edits(text)
     assert [edit.name for edit in edits] == ["raise the arm", "a second cone", "no beacon"]
-    assert edits[1].keep_source and edits[2].deleted
+    assert isinstance(edits[1], Copy) and isinstance(edits[2], Delete)
     (cone,) = parse_edits(moved)
     assert (cone.fill, cone.relight) == ("surroundings", "none")
 

@@ -158,7 +158,7 @@ def shifted_box(center):
 
 def test_moved_box_looks_like_a_box_elsewhere():
     cage = Cage.box((0, 0, 0), (0.7, 0.7, 0.7))
-    stack = EditStack([Edit(cage, adjustment="discrete").translate((0.1, 0.8, -0.2))])
+    stack = EditStack([Edit.move(cage).translate((0.1, 0.8, -0.2))])
     view = camera(16, fov_x=0.7)
     moved = render_sampled(shifted_box((0, 0, 0)), view, samples=300, edits=stack)
     truth = render_sampled(shifted_box((0.1, 0.8, -0.2)), view, samples=300)

@@ -7,7 +7,7 @@ import pytest
 
 from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, Trilinear
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.images.metrics import psnr
@@ -92,17 +92,15 @@ INNER = Cage.box((0.1, 0, 0.1), (0.7, 0.6, 0.8))
 OUTER = Cage.box((0.05, 0, 0.1), (2.4, 2.4, 2.4))
 EDITS = {
     "continuous": EditStack(
-        [Edit(INNER, OUTER, shell="trilinear").rotate((0.1, 0.2, 0.3)).translate((0.1, 0.05, 0.1))]
+        [Edit.continuous(INNER, OUTER, shell=Trilinear()).rotate((0.1, 0.2, 0.3)).translate((0.1, 0.05, 0.1))]
     ),
-    "corner": EditStack([Edit(INNER, OUTER, shell="trilinear").move_corner(7, (0.15, 0.1, 0.2))]),
-    "move": EditStack([Edit(INNER, adjustment="discrete").translate((0.2, -0.9, 0.3))]),
-    "copy out of bounds": EditStack(
-        [Edit(INNER, adjustment="discrete", keep_source=True).translate((0.0, -1.2, 0.2))]
-    ),
+    "corner": EditStack([Edit.continuous(INNER, OUTER, shell=Trilinear()).move_corner(7, (0.15, 0.1, 0.2))]),
+    "move": EditStack([Edit.move(INNER).translate((0.2, -0.9, 0.3))]),
+    "copy out of bounds": EditStack([Edit.copy(INNER).translate((0.0, -1.2, 0.2))]),
     "delete": EditStack([Edit.delete(INNER)]),
     "lattice": EditStack(
         [
-            Edit(INNER, OUTER, shell="trilinear", lattice=24)
+            Edit.continuous(INNER, OUTER, shell=Trilinear(), lattice=24)
             .rotate((0.1, 0.2, 0.3))
             .translate((0.1, 0.05, 0.1))
         ]
@@ -110,16 +108,16 @@ EDITS = {
     # Samples that the second edit moves land in the box of the first, which their ray does not meet.
     "lattices that overlap": EditStack(
         [
-            Edit(
+            Edit.continuous(
                 Cage.box((-0.25, 0.1, 0.1), (0.4, 0.4, 0.6)),
                 Cage.box((-0.25, 0.1, 0.1), (0.8, 0.9, 1.2)),
-                shell="trilinear",
+                shell=Trilinear(),
                 lattice=24,
             ).translate((-0.15, 0, 0.1)),
-            Edit(
+            Edit.continuous(
                 Cage.box((-0.2, 0, 0.1), (0.9, 0.9, 0.9)),
                 Cage.box((0.3, 0, 0.1), (2.2, 2.0, 2.0)),
-                shell="trilinear",
+                shell=Trilinear(),
                 lattice=24,
             ).translate((0.5, 0.1, 0)),
         ]
@@ -127,32 +125,25 @@ EDITS = {
     # Of the second edit alone rays go straight, but what it shows the first one has changed.
     "copy of what was changed": EditStack(
         [
-            Edit(INNER, Cage.box((0.1, 0, 0.1), (1.2, 1.1, 1.3)), shell="trilinear").translate((0, 0, 0.2)),
-            Edit(INNER, adjustment="discrete", keep_source=True).translate((-0.65, -0.9, 0)),
+            Edit.continuous(INNER, Cage.box((0.1, 0, 0.1), (1.2, 1.1, 1.3)), shell=Trilinear()).translate(
+                (0, 0, 0.2)
+            ),
+            Edit.copy(INNER).translate((-0.65, -0.9, 0)),
         ]
     ),
     "copy through a bent cage": EditStack(
-        [
-            Edit(INNER, adjustment="discrete", keep_source=True)
-            .translate((-0.4, -0.9, 0.2))
-            .move_corner(7, (0.2, 0.1, 0.1))
-        ]
+        [Edit.copy(INNER).translate((-0.4, -0.9, 0.2)).move_corner(7, (0.2, 0.1, 0.1))]
     ),
     "turned copy": EditStack(
-        [
-            Edit(INNER, adjustment="discrete", keep_source=True)
-            .rotate((0.7, 0.5, 0.9))
-            .scale(1.4)
-            .translate((-0.4, -0.9, 0.2))
-        ]
+        [Edit.copy(INNER).rotate((0.7, 0.5, 0.9)).scale(1.4).translate((-0.4, -0.9, 0.2))]
     ),
     "two": EditStack(
         [
-            Edit(INNER, adjustment="discrete").rotate((0, 0, 0.8)).translate((0, -0.5, 0)),
-            Edit(
+            Edit.move(INNER).rotate((0, 0, 0.8)).translate((0, -0.5, 0)),
+            Edit.continuous(
                 Cage.box((0, -0.4, 0.1), (0.9, 0.9, 0.9)),
                 Cage.box((0, -0.4, 0.1), (1.8, 1.8, 1.8)),
-                shell="trilinear",
+                shell=Trilinear(),
             ).scale(1.3),
         ]
     ),
@@ -204,7 +195,7 @@ def test_normals_face_outwards_on_a_ball_and_follow_an_edit():
     assert facing.sum() > 30
     assert cosine.min() > 0.97  # a soft ball on a grid of 49: within 14 degrees
     turned = EditStack(
-        [Edit(Cage.box((0, 0, 0), 1.3), Cage.box((0, 0, 0), 1.9), shell="trilinear").scale(1.1)]
+        [Edit.continuous(Cage.box((0, 0, 0), 1.3), Cage.box((0, 0, 0), 1.9), shell=Trilinear()).scale(1.1)]
     )
     after = Renderer(field, turned, step=0.25).render(CAMERA, normals=True)
     both = (after.opacity.ravel() > 0.99) & facing
@@ -259,7 +250,7 @@ def test_a_field_ends_at_its_grid(edited: bool) -> None:
     )
     inner = Cage.box((0.4, 0.4, 0.4), 0.3)
     edits = EditStack(
-        [Edit(inner, inner.grown(0.2), lattice=8).translate((0.05, 0.0, 0.0))] if edited else []
+        [Edit.continuous(inner, inner.grown(0.2), lattice=8).translate((0.05, 0.0, 0.0))] if edited else []
     )
     camera = Camera.look_at((3.0, 2.4, 1.8), (0.6, 0.5, 0.4), width=32, height=32, fov_x=0.5)
     frame = Renderer(field, edits, step=0.1).render(camera, background="black")

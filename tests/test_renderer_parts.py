@@ -18,14 +18,14 @@ from scenes import ball_field
 CAMERA = Camera.look_at((0, -3, 0.8), (0, 0, 0), width=37, height=29, fov_x=0.8)
 INNER = Cage.box((0, 0, 0), 1.2)
 EDITS = {
-    "continuous": [Edit(INNER, INNER.grown(0.6), lattice=16).rotate((0.3, 0.2, 0.5)).translate((0.1, 0, 0))],
-    "squeezed": [Edit(INNER, INNER.grown(0.4), lattice=16).scale(0.4)],
-    "copy": [
-        Edit(INNER, adjustment="discrete", keep_source=True).rotate((0.3, 0, 0)).translate((0, 0.9, 0.9))
+    "continuous": [
+        Edit.continuous(INNER, INNER.grown(0.6), lattice=16).rotate((0.3, 0.2, 0.5)).translate((0.1, 0, 0))
     ],
+    "squeezed": [Edit.continuous(INNER, INNER.grown(0.4), lattice=16).scale(0.4)],
+    "copy": [Edit.copy(INNER).rotate((0.3, 0, 0)).translate((0, 0.9, 0.9))],
     "two": [
-        Edit(INNER, INNER.grown(0.4), lattice=16).translate((0.2, 0, 0)),
-        Edit(INNER, adjustment="discrete").translate((0, 0.9, 0.9)),
+        Edit.continuous(INNER, INNER.grown(0.4), lattice=16).translate((0.2, 0, 0)),
+        Edit.move(INNER).translate((0, 0.9, 0.9)),
     ],
 }
 
@@ -89,7 +89,7 @@ def test_the_coarse_occupancy_holds_what_is_squeezed_strongly(seed: int) -> None
         sh=np.zeros((12, 1, 3), np.float32),
     )
     plain = Renderer(field)
-    stack = EditStack([Edit(INNER, Cage.box((0, 0, 0), 1.6), lattice=48).scale(0.15)])
+    stack = EditStack([Edit.continuous(INNER, Cage.box((0, 0, 0), 1.6), lattice=48).scale(0.15)])
     fine, coarse = plain.with_edits(stack), plain.with_edits(stack, coarse=True)
     assert fine.occupancy.blocks.sum() > 50
     assert (coarse.occupancy.blocks >= fine.occupancy.blocks).all()

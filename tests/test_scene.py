@@ -24,7 +24,7 @@ from scenes import ball_field, ball_scene, files_of
 
 def test_round_trip_is_exact(tmp_path: Path) -> None:
     inner = Cage.box((0.1, 0.0, 0.0), 0.4)
-    edit = Edit(inner, Cage.box((0.1, 0.0, 0.0), 1.2), name="push").translate((0.1, 0.0, 0.05))
+    edit = Edit.continuous(inner, Cage.box((0.1, 0.0, 0.0), 1.2), name="push").translate((0.1, 0.0, 0.05))
     scene = ball_scene().with_edits(EditStack([edit, Edit.delete(Cage.box((0.4, 0.4, 0.4), 0.2))]))
     scene.save(tmp_path / "scene")
     assert {file.name for file in (tmp_path / "scene").iterdir()} == {
@@ -248,7 +248,11 @@ def test_invalid_scene_values() -> None:
 
 def test_render_agrees_with_the_exact_renderer() -> None:
     inner = Cage.box((0.0, 0.0, 0.0), 1.2)
-    lift = Edit(inner, inner.grown(0.5), lattice=64).rotate((0.0, 0.2, 0.0)).translate((0.0, 0.0, 0.2))
+    lift = (
+        Edit.continuous(inner, inner.grown(0.5), lattice=64)
+        .rotate((0.0, 0.2, 0.0))
+        .translate((0.0, 0.0, 0.2))
+    )
     scene = ball_scene().with_edits(EditStack([lift]))
     camera = scene.cameras["test"][1]
     fused, exact = (scene.render(camera, exact=exact, normals=True) for exact in (False, True))
@@ -314,9 +318,7 @@ def test_with_edits_shares_the_field_and_moves_what_it_says() -> None:
     scene = ball_scene()
     camera = Camera.look_at((0, -3, 0), (0, 0, 0), width=48, height=48, fov_x=0.8)
     before = scene.render(camera)
-    edited = scene.with_edits(
-        EditStack([Edit(Cage.box((0, 0, 0), 1.2), adjustment="discrete").translate((0, 0, 0.5))])
-    )
+    edited = scene.with_edits(EditStack([Edit.move(Cage.box((0, 0, 0), 1.2)).translate((0, 0, 0.5))]))
     after = edited.render(camera)
     assert edited.renderer.grid.base is scene.renderer.grid  # with the layers of its patch
     rows = [np.average(np.arange(48), weights=frame.opacity.sum(axis=1)) for frame in (before, after)]

@@ -22,7 +22,7 @@ from cagefield.rendering.renderers import renderer_of
 from scenes import ball_field, ball_scene
 from splat_scenes import assert_same_splats, ball_of_splats, random_splats, splat_scene
 
-LIFT = Edit(Cage.box((0, 0, 0), 1.2), adjustment="discrete").translate((0, 0, 0.4))
+LIFT = Edit.move(Cage.box((0, 0, 0), 1.2)).translate((0, 0, 0.4))
 
 
 def test_the_file_says_which_kind_of_field_it_holds(tmp_path: Path) -> None:
@@ -76,7 +76,9 @@ def test_edits_move_splats_and_share_the_field() -> None:
 
 def test_exact_pictures_leave_lattices_out() -> None:
     inner = Cage.box((0.0, 0.0, 0.3), 0.5)
-    coarse = Edit(inner, inner.grown(0.6), lattice=6).rotate((0.0, 0.0, 0.9)).translate((0.1, 0.0, 0.1))
+    coarse = (
+        Edit.continuous(inner, inner.grown(0.6), lattice=6).rotate((0.0, 0.0, 0.9)).translate((0.1, 0.0, 0.1))
+    )
     camera = splat_scene().cameras["test"][0].resized(96, 64)
     quick = splat_scene().with_edits(EditStack([coarse]))
     exact = splat_scene().with_edits(EditStack([coarse.replace(lattice=None)]))

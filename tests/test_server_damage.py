@@ -26,9 +26,11 @@ from sent_pictures import pixels_of
 
 SIDE = 64
 CAMERA = Camera.look_at((0.6, -3.4, 0.9), (0, 0, 0), width=SIDE, height=SIDE, fov_x=0.8)
-PART = Edit(Cage.box((0.5, 0, 0.2), 0.4), Cage.box((0.5, 0, 0.2), 0.9), lattice=24)
-OTHER = Edit(Cage.box((-0.2, 0, 0.2), 0.5), Cage.box((-0.2, 0, 0.2), 1.1), lattice=24).rotate((0, 0, 0.5))
-COPY = Edit(Cage.box((0.4, 0, 0), 0.5), adjustment="discrete", keep_source=True).translate((-0.6, 0, 0.6))
+PART = Edit.continuous(Cage.box((0.5, 0, 0.2), 0.4), Cage.box((0.5, 0, 0.2), 0.9), lattice=24)
+OTHER = Edit.continuous(Cage.box((-0.2, 0, 0.2), 0.5), Cage.box((-0.2, 0, 0.2), 1.1), lattice=24).rotate(
+    (0, 0, 0.5)
+)
+COPY = Edit.copy(Cage.box((0.4, 0, 0), 0.5)).translate((-0.6, 0, 0.6))
 
 
 # ---- rectangles ----
@@ -282,8 +284,8 @@ def test_pictures_are_the_same_outside_what_is_rendered(renderers: RendererCache
 PART_OF_BALL = Cage.box((0.4, 0, 0.25), (0.3, 0.3, 0.25))
 PATCHED = {
     "delete": Edit.delete(PART_OF_BALL),
-    "move": Edit(PART_OF_BALL, adjustment="discrete").translate((0.3, 0, 0.1)),
-    "copy": Edit(PART_OF_BALL, adjustment="discrete", keep_source=True).translate((0.2, 0, 0.15)),
+    "move": Edit.move(PART_OF_BALL).translate((0.3, 0, 0.1)),
+    "copy": Edit.copy(PART_OF_BALL).translate((0.2, 0, 0.15)),
 }
 
 
@@ -306,7 +308,7 @@ def test_switching_fill_and_light_changes_pictures_where_patches_reach(shaded: S
     assert (extent.boxes(patched).max(axis=(0, 1)) >= region.max(axis=(0, 1))).all()
     assert np.array_equal(extent.boxes(bare), bare.boxes)
     first, second = (shaded.with_edits(EditStack([edit])).render(CAMERA).rgb for edit in (bare, patched))
-    changed = EditStack([patched]).changed_boxes(EditStack([bare]), extent.boxes)
+    changed = EditStack([patched]).changed_boxes(EditStack([bare]), lambda step: extent.boxes(step.edit))
     x, y, w, h = pixels(screen_bounds(CAMERA, changed), SIDE, SIDE)
     difference = np.abs(first - second).max(axis=2)
     assert difference.max() > 0.1

@@ -24,7 +24,7 @@ from cagefield.server.web.worker_threads import run_in_thread, start_all_threads
 from scenes import ball_scene
 
 INNER = Cage.box((0, 0, 0), 1.2)
-MOVED = Edit(INNER, INNER.grown(0.4), lattice=40, relight="none").translate((0.2, 0, 0))
+MOVED = Edit.continuous(INNER, INNER.grown(0.4), lattice=40, relight="none").translate((0.2, 0, 0))
 CAMERA = Camera.look_at((0, -3, 0.8), (0, 0, 0), width=8, height=8, fov_x=0.8)
 
 

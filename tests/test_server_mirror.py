@@ -36,7 +36,7 @@ def reflected(points: np.ndarray, axis: int, at: float) -> np.ndarray:
     "operation", OPERATIONS, ids=lambda o: f"{type(o).__name__} {getattr(o, 'axes', '')}"
 )
 def test_every_operation_is_the_mirror_image_of_itself(axis: int, operation: ops.Operation) -> None:
-    edit = Edit(INNER, adjustment="discrete").then(operation)
+    edit = Edit.move(INNER).then(operation)
     other = mirror_edit(edit, axis, 0.3)
     rng = np.random.default_rng(0)
     points = INNER.corners.mean(axis=0) + rng.uniform(-0.3, 0.3, (200, 3))

@@ -27,7 +27,7 @@ from cagefield.server.web.security import Guard
 from scenes import ball_scene
 
 POSE = np.eye(4).ravel().tolist()
-BALL = Edit(Cage.box((0, 0, 0), 1.1), adjustment="discrete", name="ball").translate((0.1, 0, 0))
+BALL = Edit.move(Cage.box((0, 0, 0), 1.1), name="ball").translate((0.1, 0, 0))
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from full_disks import files_up_to
 from scenes import ball_scene, files_of
 
 INNER = Cage.box((0, 0, 0), 1.1)
-BALL = Edit(INNER, INNER.grown(0.4), name="ball", lattice=16)
+BALL = Edit.continuous(INNER, INNER.grown(0.4), lattice=16, name="ball")
 KEY = Keyframe(tuple(np.eye(4).reshape(-1)), 45.0, 2.0, {1: 0.5})
 
 

@@ -28,9 +28,9 @@ from scenes import ball_scene
 
 BOUNDS = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
 INNER = Cage.box((0, 0, 0), 0.4)
-ARM = Edit(INNER, INNER.grown(0.3), name="arm", lattice=16).translate((0.2, 0, 0))
-STILL = Edit(Cage.box((0.8, 0, 0), 0.2), adjustment="discrete", name="still").translate((0, 0.2, 0))
-TURNED = Edit(INNER, INNER.grown(0.075), name="turned", lattice=16).rotate((0, 0, 90))
+ARM = Edit.continuous(INNER, INNER.grown(0.3), lattice=16, name="arm").translate((0.2, 0, 0))
+STILL = Edit.move(Cage.box((0.8, 0, 0), 0.2), name="still").translate((0, 0.2, 0))
+TURNED = Edit.continuous(INNER, INNER.grown(0.075), lattice=16, name="turned").rotate((0, 0, 90))
 """A cube that fits into its outer cage at its beginning and its end, and not halfway."""
 
 Act = Callable[[Session], object]

@@ -55,8 +55,8 @@ from cagefield.rendering.voxels.kernels.occupancy_discontinuous import occupied_
 
 SIDE = 48
 INNER = Cage.box((0, 0, 0), 1.2)
-MOVED = Edit(INNER, INNER.grown(0.4), name="ball", lattice=24).translate((0.25, 0, 0))
-COPY = Edit(INNER, adjustment="discrete", keep_source=True).translate((0, 0.6, 0.6))
+MOVED = Edit.continuous(INNER, INNER.grown(0.4), lattice=24, name="ball").translate((0.25, 0, 0))
+COPY = Edit.copy(INNER).translate((0, 0.6, 0.6))
 CAMERA = Camera.look_at((0, -3, 0.8), (0, 0, 0), width=SIDE, height=SIDE, fov_x=0.8)
 WHOLE = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
 

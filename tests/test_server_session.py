@@ -6,7 +6,19 @@ import numpy as np
 import pytest
 
 from cagefield.cameras.keyframes import Keyframe
-from cagefield.edits import Edit, EditStack, MoveCorner, Rotate, Scale, Translate, dump_edits
+from cagefield.edits import (
+    Copy,
+    Delete,
+    Edit,
+    EditStack,
+    Flow,
+    MoveCorner,
+    Rotate,
+    Scale,
+    Translate,
+    Trilinear,
+    dump_edits,
+)
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
 from cagefield.errors import CageError, EditError
@@ -20,8 +32,8 @@ from cagefield.server.protocol.conversion import edit_state
 
 BOUNDS = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
 INNER = Cage.box((0, 0, 0), 0.4)
-ARM = Edit(INNER, INNER.grown(0.3), name="arm", lattice=16)
-CUP = Edit(Cage.box((0.6, 0, 0), 0.2), adjustment="discrete", name="cup")
+ARM = Edit.continuous(INNER, INNER.grown(0.3), lattice=16, name="arm")
+CUP = Edit.move(Cage.box((0.6, 0, 0), 0.2), name="cup")
 
 
 def session(*edits: Edit) -> Session:
@@ -114,7 +126,7 @@ def test_set_mode_moves_cages_and_leaves_the_operations() -> None:
 
 def test_set_mode_turns_both_cages_about_the_inner_ones_pivot() -> None:
     outer = Cage.box((0.1, 0.1, 0), 1.4)
-    s = session(Edit(INNER, outer, name="a"))
+    s = session(Edit.continuous(INNER, outer, name="a"))
     s.apply(1, "both", Rotate((0, 0, 90)))
     edit = s.document.entry(1).edit
     assert edit.outer is not None
@@ -134,7 +146,7 @@ def test_in_set_mode_the_outer_cage_stops_at_the_inner_one() -> None:
     ("edit", "target", "operation", "why"),
     [
         (ARM, "field", Translate((2.0, 0, 0)), validity.OUTSIDE_MESSAGE),
-        (ARM.replace(shell="trilinear"), "field", Rotate((0, 0, 80)), validity.FOLDED),
+        (ARM.replace(shell=Trilinear()), "field", Rotate((0, 0, 80)), validity.FOLDED),
         (ARM, "field", Translate((0.299999, 0, 0)), validity.CLOSE),
         (ARM, "field", MoveCorner(0, (2.0, 2.0, 2.0)), validity.INSIDE_OUT),
         (ARM, "outer", Translate((2.0, 0, 0)), "the inner cage must stay inside the outer cage"),
@@ -271,16 +283,16 @@ def test_saved_follows_the_document_through_undo() -> None:
 
 
 def test_kinds_keep_what_the_other_kinds_cannot_have() -> None:
-    s = session(ARM.replace(falloff="linear", width=0.5).translate((0.1, 0, 0)))
+    s = session(ARM.replace(shell=Flow("linear", 0.5)).translate((0.1, 0, 0)))
     s.change(1, kind="delete")
     edit = s.document.entry(1).edit
-    assert edit.deleted and not edit.operations and edit.width == 1.0
+    assert isinstance(edit, Delete) and not edit.operations and edit.shell_settings.shell == Flow()
     s.change(1, kind="copy")
     edit = s.document.entry(1).edit
-    assert edit.keep_source and edit.operations == (Translate((0.1, 0, 0)),)
+    assert isinstance(edit, Copy) and edit.operations == (Translate((0.1, 0, 0)),)
     s.change(1, kind="continuous")
     edit = s.document.entry(1).edit
-    assert (edit.falloff, edit.width, edit.operations) == ("linear", 0.5, (Translate((0.1, 0, 0)),))
+    assert (edit.shell, edit.operations) == (Flow("linear", 0.5), (Translate((0.1, 0, 0)),))
 
 
 def test_fill_and_shadows_are_switched_undone_and_kept_through_kinds() -> None:
@@ -316,11 +328,11 @@ def test_a_discrete_edit_that_becomes_continuous_gets_an_outer_cage_it_fits() ->
 
 
 def test_a_shell_without_falloff_loses_it_and_gets_it_back() -> None:
-    s = session(ARM.replace(width=0.5))
+    s = session(ARM.replace(shell=Flow(width=0.5)))
     s.change(1, shell="trilinear")
-    assert s.document.entry(1).edit.width == 1.0
+    assert s.document.entry(1).edit.shell == Trilinear()
     s.change(1, shell="flow")
-    assert s.document.entry(1).edit.width == 0.5
+    assert s.document.entry(1).edit.shell == Flow(width=0.5)
 
 
 def test_an_edit_that_is_impossible_is_left_out_and_says_why() -> None:

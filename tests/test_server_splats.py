@@ -49,8 +49,8 @@ from splat_scenes import ball_of_splats, splat_scene
 
 SIDE = 48
 INNER = Cage.box((0, 0, 0), 1.2)
-MOVED = Edit(INNER, INNER.grown(0.4), name="ball", lattice=128).translate((0.25, 0, 0))
-COPY = Edit(INNER, adjustment="discrete", keep_source=True).translate((0, 0.6, 0.6))
+MOVED = Edit.continuous(INNER, INNER.grown(0.4), lattice=128, name="ball").translate((0.25, 0, 0))
+COPY = Edit.copy(INNER).translate((0, 0.6, 0.6))
 CAMERA = Camera.look_at((0, -3, 0.8), (0, 0, 0), width=SIDE, height=SIDE, fov_x=0.8)
 PART = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
 
@@ -133,7 +133,7 @@ def test_a_cage_is_fitted_to_the_splats_in_it(renderers: RendererCache) -> None:
     # The ball's box, half a probe more and what the splats on it are wide.
     np.testing.assert_allclose([low, high], [[-0.5] * 3, [0.5] * 3], atol=0.09)
     assert (low < -0.46).all() and (high > 0.46).all()
-    aside = fit(Cage.box((0.5, 0, 0), 1.9), Edit(INNER, adjustment="discrete").translate((0.5, 0, 0)))
+    aside = fit(Cage.box((0.5, 0, 0), 1.9), Edit.move(INNER).translate((0.5, 0, 0)))
     np.testing.assert_allclose(aside.corners.mean(axis=0), (0.5, 0, 0), atol=0.05)
     with pytest.raises(EditError, match="nothing dense inside the inner cage"):
         fit(Cage.box((0, 0, 0), 1.2), Edit.delete(INNER))

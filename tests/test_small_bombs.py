@@ -17,7 +17,6 @@ from cagefield.cameras.keyframe_files import load_keys
 from cagefield.datasets import load_dataset
 from cagefield.datasets.photos import read_photo
 from cagefield.edits import EditStack, parse_edits
-from cagefield.edits.device.edit_lattice import nodes_of
 from cagefield.errors import CagefieldError, DatasetError, EditError, EditFileError, FieldError
 from cagefield.fields.field_files import write_tensors
 from cagefield.fields.nerf_file import load_nerf
@@ -182,5 +181,5 @@ def test_a_lattice_that_would_take_most_of_the_memory_is_refused(monkeypatch: py
         format="json",
     )
     with pytest.raises(EditError, match=r"512 nodes per axis takes 4\.3 GB, of the 3\.0 GB that are free"):
-        nodes_of(edit)
-    assert len(nodes_of(edit.replace(lattice=8))) == 512
+        edit.lattice_nodes  # noqa: B018
+    assert len(edit.replace(lattice=8).lattice_nodes) == 512

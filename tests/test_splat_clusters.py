@@ -166,7 +166,7 @@ def test_a_renderer_uses_them_with_edits_too(monkeypatch: pytest.MonkeyPatch) ->
     field = ball_of_splats(20_000)
     view = Camera.look_at((0.0, -3.0, 1.0), (0, 0, 0), width=32, height=32, fov_x=0.4)
     inner = Cage.box((0.0, 0.0, 0.3), 0.2)
-    stacks = [EditStack(), EditStack([Edit(inner, inner.grown(0.4)).translate((0.1, 0.0, 0.1))]),
+    stacks = [EditStack(), EditStack([Edit.continuous(inner, inner.grown(0.4)).translate((0.1, 0.0, 0.1))]),
               EditStack([Edit.delete(inner)])]  # fmt: skip
     want = [SplatRenderer(field, stack).render(view) for stack in stacks]
     monkeypatch.setattr(splat_renderer, "LEAST", 1000)

@@ -113,7 +113,7 @@ def test_a_gpu_draws_the_renderers_pictures(monkeypatch: pytest.MonkeyPatch) -> 
     """SplatRenderer takes the device's rasteriser where a GPU runs, edited or not."""
     field = random_splats(200)
     inner = Cage.box((0, 0, 0), 0.6)
-    edits = EditStack([Edit(inner, adjustment="discrete").translate((0.6, 0.4, 0.0))])
+    edits = EditStack([Edit.move(inner).translate((0.6, 0.4, 0.0))])
     view = camera()
     plain = SplatRenderer(field)
     assert isinstance(plain.project(view), Projection) or devices.is_gpu()

@@ -142,7 +142,7 @@ def test_opacity_gathers_up_to_where_rays_meet_discs() -> None:
 def test_edits_carry_tangents_and_bake_into_discs() -> None:
     field = discs("cloud")
     cage = Cage.box((0.0, 0.0, 0.0), 0.6)
-    edits = EditStack([Edit(cage, cage.grown(0.6)).rotate((0.0, 0.4, 0.3)).scale((1.3, 1.0, 0.9))])
+    edits = EditStack([Edit.continuous(cage, cage.grown(0.6)).rotate((0.0, 0.4, 0.3)).scale((1.3, 1.0, 0.9))])
     for got in (deformed_splats(field, edits), deformed_splats_reference(field, edits)):
         assert got.tangents is not None
     want = deformed_splats_reference(field, edits)

@@ -172,7 +172,7 @@ def test_fitted_splats_look_like_the_field_from_cameras_that_were_held_out() -> 
 
 def test_edits_are_in_what_is_fitted() -> None:
     inner = Cage.box((0, 0, 0), 1.3)
-    moved = Edit(inner, adjustment="discrete").translate((0.5, 0.0, 0.0))
+    moved = Edit.move(inner).translate((0.5, 0.0, 0.0))
     reference = renderer_of(BALL, EditStack([moved]))
     result = fit_splats(
         reference, CAMERAS, (), BOX, SplatConfig(steps=40, splats=600, sh_degree=0, dropout=0.0)

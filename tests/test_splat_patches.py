@@ -14,7 +14,7 @@ from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.patcher import Patcher
 from cagefield.completion.splat_patch import build_splat_patch
 from cagefield.completion.surfaces.splat_voxelization import voxelize_splats
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, PreparedEdit, PreparedStack
 from cagefield.edits.options import Clone
 from cagefield.edits.patch import NewLight, SplatPatch
 from cagefield.fields.sh import C0
@@ -46,9 +46,9 @@ def seen(field: SplatField, edits: EditStack, scale: float = 1.0) -> NDArray[np.
     return np.stack([renderer.render(camera, background="white").rgb for camera in cameras(scale)])
 
 
-def patched(field: SplatField, edit: Edit, light: LightModel | None = LIGHT) -> EditStack:
+def patched(field: SplatField, edit: Edit, light: LightModel | None = LIGHT) -> PreparedStack:
     """The edit with its patch."""
-    return EditStack([edit.replace(patch=build_splat_patch(field, EditStack(), edit, light))])
+    return PreparedStack([PreparedEdit(edit, build_splat_patch(field, EditStack(), edit, light))])
 
 
 def test_a_deleted_box_leaves_a_floor_without_a_hole_or_a_shadow():
@@ -143,7 +143,7 @@ def test_a_shadow_has_an_edge_on_splats_that_are_longer_than_that(
 
 def test_a_moved_box_takes_its_shadow_along():
     field = room(True)
-    edit = Edit(cage(), adjustment="discrete").translate([-0.5, 0.25, 0.0])
+    edit = Edit.move(cage()).translate([-0.5, 0.25, 0.0])
     truth = seen(room(True, by=(-0.5, 0.25)), EditStack())
     bare, both = db(seen(field, EditStack([edit])), truth), db(seen(field, patched(field, edit)), truth)
     assert both > bare + 5.0
@@ -154,8 +154,8 @@ def test_later_edits_take_the_fill_along_and_a_pages_splats_are_the_same():
     first = Edit.delete(cage())
     patch = build_splat_patch(field, EditStack(), first, LIGHT)
     spot = Cage.box((0.1, 0.0, 0.0), (0.5, 0.5, 0.2))
-    second = Edit(spot, adjustment="discrete", fill="none", relight="none").translate([0.0, 0.0, 0.4])
-    stack = EditStack([first.replace(patch=patch), second])
+    second = Edit.move(spot, fill="none", relight="none").translate([0.0, 0.0, 0.4])
+    stack = PreparedStack([PreparedEdit(first, patch), second])
     drawn = deformed_splats(field, stack)
     lifted = drawn.means[(np.abs(drawn.means - [0.1, 0.0, 0.4]) < [0.2, 0.2, 0.05]).all(axis=1)]
     assert len(patch.sources) > 50 and len(lifted) > 30
@@ -209,7 +209,7 @@ def test_scenes_fill_and_relight_splats_unless_told_not_to():
     (moving,) = patcher.prepare([edit], moving=True)
     assert isinstance(moving.patch, SplatPatch) and moving.patch.part is None
     # Without light a patch does not depend on where the part is put down.
-    move = Edit(cage(), adjustment="discrete", relight="none").translate((0.5, 0.0, 0.0))
+    move = Edit.move(cage(), relight="none").translate((0.5, 0.0, 0.0))
     further = move.translate((0.1, 0.0, 0.0))
     there, further = (scene.patcher.prepare([each])[0] for each in (move, further))
     assert there.patch is further.patch is not None

@@ -21,13 +21,13 @@ from splat_scenes import assert_same_splats, random_splats
 
 CAMERA = Camera.look_at((0.3, -4.5, 0.6), (0.1, 0, 0.1), width=100, height=120, fov_x=0.6)
 BENDS = {
-    "stretch": Edit(Cage.box((0, 0, 0.3), (0.6, 0.6, 0.5)), Cage.box((0, 0, 0.3), (2, 2, 3.6))).scale(
-        (1, 1, 4)
-    ),
-    "twist": Edit(Cage.box((0, 0, 0.9), (0.8, 0.8, 0.4)), Cage.box((0, 0, 0.2), (1.8, 1.8, 2.2))).rotate(
-        (0, 0, np.radians(150))
-    ),
-    "bend": Edit(Cage.box((0, 0, 0.8), 0.5), Cage.box((0.3, 0, 0.2), (2.4, 2.4, 2.6)))
+    "stretch": Edit.continuous(
+        Cage.box((0, 0, 0.3), (0.6, 0.6, 0.5)), Cage.box((0, 0, 0.3), (2, 2, 3.6))
+    ).scale((1, 1, 4)),
+    "twist": Edit.continuous(
+        Cage.box((0, 0, 0.9), (0.8, 0.8, 0.4)), Cage.box((0, 0, 0.2), (1.8, 1.8, 2.2))
+    ).rotate((0, 0, np.radians(150))),
+    "bend": Edit.continuous(Cage.box((0, 0, 0.8), 0.5), Cage.box((0.3, 0, 0.2), (2.4, 2.4, 2.6)))
     .translate((0.55, 0, -0.1))
     .rotate((0, np.radians(60), 0)),
 }
@@ -127,7 +127,7 @@ def test_a_cut_keeps_mass_mean_and_covariance(offset: float) -> None:
     field = SplatField(
         [[0.3 + 0.03 * offset, 0, 0]], np.log([[0.03, 0.02, 0.01]]), q, [1e-3], np.zeros((1, 1, 3))
     )
-    edit = EditStack([Edit(INNER, adjustment="discrete").translate((0, 2, 0))])
+    edit = EditStack([Edit.move(INNER).translate((0, 2, 0))])
     rounds, splitting.CUTS = splitting.CUTS, 1
     try:
         parts = split_for_edits(field, edit)
@@ -183,7 +183,7 @@ def test_nothing_hangs_over_a_cut(delete: bool) -> None:
         chance.uniform(0.2, 0.9, count),
         np.zeros((count, 1, 3)),
     )
-    edit = Edit.delete(INNER) if delete else Edit(INNER, adjustment="discrete").translate((3.0, 0, 0))
+    edit = Edit.delete(INNER) if delete else Edit.move(INNER).translate((3.0, 0, 0))
 
     def over(parts: SplatField) -> float:
         """The share of the mass that lies where the cage was, of splats that stay."""
@@ -203,10 +203,10 @@ def test_nothing_hangs_over_a_cut(delete: bool) -> None:
 
 def test_edits_that_bend_nothing_split_nothing() -> None:
     field = random_splats(200)
-    far = Edit(Cage.box((9, 0, 0), 0.5), Cage.box((9, 0, 0), 1.5)).translate((0.1, 0, 0))
+    far = Edit.continuous(Cage.box((9, 0, 0), 0.5), Cage.box((9, 0, 0), 1.5)).translate((0.1, 0, 0))
     assert split_for_edits(field, EditStack([far])) is field
     assert split_for_edits(field, EditStack()) is field
-    moved = Edit(Cage.box((0, 0, 0), 50.0), adjustment="discrete").translate((100.0, 0, 0))
+    moved = Edit.move(Cage.box((0, 0, 0), 50.0)).translate((100.0, 0, 0))
     assert split_for_edits(field, EditStack([moved])) is field
 
 
@@ -219,7 +219,7 @@ def test_there_are_never_many_times_as_many(monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.mark.parametrize("name", [*BENDS, "move"])
 def test_baked_splats_look_as_the_edited_ones(name: str) -> None:
     field = dataclasses.replace(random_splats(150, degree=2), bounds=np.array([[-2.0] * 3, [2.0] * 3]))
-    moves = {**BENDS, "move": Edit(INNER, adjustment="discrete", keep_source=True).rotate((0.5, 1, 2))}
+    moves = {**BENDS, "move": Edit.copy(INNER).rotate((0.5, 1, 2))}
     edits = EditStack([moves[name]])
     edited = SplatRenderer(field, edits).render(CAMERA).rgb
     baked = baked_splats(field, edits)
@@ -230,7 +230,7 @@ def test_baked_splats_look_as_the_edited_ones(name: str) -> None:
 
 def test_baking_leaves_what_no_edit_reaches_as_it_is() -> None:
     field = random_splats(300, degree=1)
-    edits = EditStack([Edit(Cage.box((0.7, 0.7, 0.7), 0.5), adjustment="discrete").translate((3, 0, 0))])
+    edits = EditStack([Edit.move(Cage.box((0.7, 0.7, 0.7), 0.5)).translate((3, 0, 0))])
     baked = baked_splats(field, edits, split=False)
     away = np.flatnonzero(~Cage.box((0.7, 0.7, 0.7), 0.5).contains(field.means))
     assert len(away) < 300

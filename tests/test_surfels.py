@@ -199,7 +199,7 @@ def test_a_rigid_motion_leaves_a_parts_shade_on_itself() -> None:
 def test_stacked_edits_keep_densities_below_zero() -> None:
     """They make the surfaces beside them sharp, and their colours show there."""
     field = slab(sharp=True)
-    moved = Edit(Cage.box((0.0, 0.0, 0.5), 0.5), adjustment="discrete").translate((0.3, 0.1, 0.2))
+    moved = Edit.move(Cage.box((0.0, 0.0, 0.5), 0.5)).translate((0.3, 0.1, 0.2))
     block = extract_block(field, EditStack([moved]), np.array([[-0.1, -0.3, 0.3], [0.7, 0.5, 0.95]]))
     inside = moved.deformed.contains(block.positions(np.ones(block.shape, bool))).reshape(block.shape)
     empty = inside & (block.density < -1.0)
@@ -210,7 +210,7 @@ def test_a_part_that_stands_free_is_not_thinned_by_its_seam() -> None:
     scene = Scene(slab(sharp=True))
     camera = Camera.look_at((1.6, -1.2, 1.5), (0.2, 0.3, 0.6), width=64, height=64, fov_x=0.7)
     # A cage that holds the box as closely as can be.
-    edit = Edit(Cage.box((0.0, 0.0, 0.5), 0.36), adjustment="discrete", fill="none", relight="none")
+    edit = Edit.move(Cage.box((0.0, 0.0, 0.5), 0.36), fill="none", relight="none")
     edit = edit.translate((0.3, 0.3, 0.1))
     hard, soft = (
         scene.with_edits(EditStack([dataclasses.replace(edit, feather=width)])).render(

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 
 from cagefield.compute import devices
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Continuous, Edit, EditStack, Trilinear
 from cagefield.geometry.cage import Cage
 from random_cages import edits, examples, seeds, unit_vectors
 
@@ -42,7 +42,7 @@ def off_faces(stack: EditStack, p: np.ndarray, margin: float = 1e-4) -> np.ndarr
 
 
 def compare(stack: EditStack, p: np.ndarray, d: np.ndarray) -> None:
-    from cagefield.edits.device.device_stack import DeviceStack
+    from cagefield.edits.device_stack import DeviceStack
 
     expected = stack.to_canonical(p, d)
     points, viewdirs, stretch, places = DeviceStack.from_stack(stack).to_canonical(p, d)
@@ -56,7 +56,7 @@ def compare(stack: EditStack, p: np.ndarray, d: np.ndarray) -> None:
     kept = ~expected.emptied & (places >= 0)
     error = np.abs(points - expected.points).max(axis=1) / largest**2
     steady = off_faces(stack, p)
-    continuous = all(edit.adjustment == "continuous" for edit in stack.active)
+    continuous = all(isinstance(edit, Continuous) for edit in stack.active)
     where = kept if continuous else kept & steady
     assert error[where].max(initial=0.0) < 60.0 * EPS
     assert np.array_equal(places[steady] < 0, expected.emptied[steady])
@@ -67,20 +67,24 @@ def compare(stack: EditStack, p: np.ndarray, d: np.ndarray) -> None:
 
 
 STACKS = {
-    "affine": [Edit(INNER, OUTER, shell="trilinear").rotate((0, 0.1, 0.3)).translate((0.1, 0, 0.1))],
+    "affine": [
+        Edit.continuous(INNER, OUTER, shell=Trilinear()).rotate((0, 0.1, 0.3)).translate((0.1, 0, 0.1))
+    ],
     "deformed": [
-        Edit(INNER, OUTER, shell="trilinear").rotate((0.2, 0.1, 0.3)).move_corner(7, (0.1, 0.1, 0.05))
+        Edit.continuous(INNER, OUTER, shell=Trilinear())
+        .rotate((0.2, 0.1, 0.3))
+        .move_corner(7, (0.1, 0.1, 0.05))
     ],
     "bent cages": [
-        Edit(BENT, OUTER.move_corner(3, (0.3, 0.2, -0.1)), shell="trilinear")
+        Edit.continuous(BENT, OUTER.move_corner(3, (0.3, 0.2, -0.1)), shell=Trilinear())
         .scale((1.1, 0.9, 1.05))
         .rotate((0, 0.1, 0))
     ],
-    "move": [Edit(INNER, adjustment="discrete").translate((0.4, 0, 0)).rotate((0, 0, 0.5))],
-    "move bent": [Edit(BENT, adjustment="discrete").translate((0.4, 0, 0)).move_face("+x", (0.1, 0.1, 0))],
-    "copy": [Edit(INNER, adjustment="discrete", keep_source=True).translate((0.2, 0, 0)).shear(xy=0.5)],
+    "move": [Edit.move(INNER).translate((0.4, 0, 0)).rotate((0, 0, 0.5))],
+    "move bent": [Edit.move(BENT).translate((0.4, 0, 0)).move_face("+x", (0.1, 0.1, 0))],
+    "copy": [Edit.copy(INNER).translate((0.2, 0, 0)).shear(xy=0.5)],
     "delete": [Edit.delete(BENT)],
-    "nothing": [Edit(INNER, OUTER, shell="trilinear")],
+    "nothing": [Edit.continuous(INNER, OUTER, shell=Trilinear())],
     "empty": [],
 }
 STACKS["chain"] = [*STACKS["deformed"], *STACKS["move bent"], *STACKS["affine"], *STACKS["delete"]]
@@ -107,7 +111,7 @@ def test_lattice_path_against_the_reference(name: str) -> None:
 
 
 def test_lattices_of_a_stack_lie_one_after_the_other() -> None:
-    from cagefield.edits.device.device_stack import DeviceStack
+    from cagefield.edits.device_stack import DeviceStack
 
     edits_ = [
         STACKS["affine"][0].replace(lattice=9),
@@ -120,7 +124,7 @@ def test_lattices_of_a_stack_lie_one_after_the_other() -> None:
 
 
 def test_what_is_outside_all_boxes_is_returned_bit_for_bit() -> None:
-    from cagefield.edits.device.device_stack import DeviceStack
+    from cagefield.edits.device_stack import DeviceStack
 
     stack = EditStack(STACKS["chain"])
     packed = DeviceStack.from_stack(stack)
@@ -133,14 +137,16 @@ def test_what_is_outside_all_boxes_is_returned_bit_for_bit() -> None:
     assert np.array_equal(points[outside], p[outside]) and np.array_equal(viewdirs[outside], d[outside])
     assert (stretch[outside] == 1.0).all()
     # Inside a continuous edit's box but outside its (turned) outer cage, too.
-    turned = Edit(INNER, Cage.box((0, 0, 0), 1.6, (0.1, 0.2, 0.1)), shell="trilinear").rotate((0.1, 0, 0))
+    turned = Edit.continuous(INNER, Cage.box((0, 0, 0), 1.6, (0.1, 0.2, 0.1)), shell=Trilinear()).rotate(
+        (0.1, 0, 0)
+    )
     points, *_ = DeviceStack.from_stack(EditStack([turned])).to_canonical(p, d)
     free = ~turned.outer.grown(1e-5).contains(p)  # type: ignore[union-attr]
     assert np.array_equal(points[free], p[free])
 
 
 def test_boxes() -> None:
-    from cagefield.edits.device.device_stack import DeviceStack
+    from cagefield.edits.device_stack import DeviceStack
 
     move = STACKS["move"][0]
     packed = DeviceStack.from_stack(
@@ -157,9 +163,11 @@ def test_boxes() -> None:
 
 @pytest.mark.parametrize("turn", [1.0, np.pi])
 def test_folded_shells_that_are_allowed_give_finite_values(turn: float) -> None:
-    from cagefield.edits.device.device_stack import DeviceStack
+    from cagefield.edits.device_stack import DeviceStack
 
-    folded = EditStack([Edit(INNER, OUTER, shell="trilinear", allow_folding=True).rotate((0, 0, turn))])
+    folded = EditStack(
+        [Edit.continuous(INNER, OUTER, shell=Trilinear(), allow_folding=True).rotate((0, 0, turn))]
+    )
     p, d = samples(5000)
     points, viewdirs, stretch, _ = DeviceStack.from_stack(folded).to_canonical(p, d)
     assert np.isfinite(points).all() and np.isfinite(viewdirs).all() and np.isfinite(stretch).all()
@@ -170,7 +178,7 @@ def test_folded_shells_that_are_allowed_give_finite_values(turn: float) -> None:
 
 def test_lattices_are_kept_with_their_edit(monkeypatch: pytest.MonkeyPatch) -> None:
     from cagefield.edits.device import edit_lattice
-    from cagefield.edits.device.device_stack import DeviceStack
+    from cagefield.edits.device_stack import DeviceStack
 
     edit = STACKS["affine"][0].replace(lattice=8)
     DeviceStack.from_stack(EditStack([edit]))

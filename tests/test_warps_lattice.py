@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, Trilinear
 from cagefield.geometry.cage import Cage
 from cagefield.warps.lattice import Lattice
 
@@ -10,7 +10,11 @@ INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0.1, 0, 0), 1.8, (0.2, 0.1, 0
 
 
 def edit() -> Edit:
-    return Edit(INNER, OUTER, shell="trilinear").rotate((0.1, 0.2, 0.2)).move_corner(7, (0.1, 0.05, 0.05))
+    return (
+        Edit.continuous(INNER, OUTER, shell=Trilinear())
+        .rotate((0.1, 0.2, 0.2))
+        .move_corner(7, (0.1, 0.05, 0.05))
+    )
 
 
 def test_an_affine_map_is_reproduced_exactly() -> None:

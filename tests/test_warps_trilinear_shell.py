@@ -6,6 +6,7 @@ from hypothesis import assume, given
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
+from cagefield.edits import Trilinear
 from cagefield.edits.edit import Edit
 from cagefield.edits.operations import euler_degrees
 from cagefield.geometry import hexahedron
@@ -157,7 +158,7 @@ def test_rotation_of_concentric_boxes_folds_where_a_dense_sample_says() -> None:
         return float(min(np.linalg.det(hexahedron.jacobian(h, u)).min() for h in shell.deformed_hexahedra))
 
     assert least(29.0) > 0.0 > least(30.5)
-    edit = Edit(INNER, OUTER, shell="trilinear").rotate((0, 0, np.radians(60.0)))
+    edit = Edit.continuous(INNER, OUTER, shell=Trilinear()).rotate((0, 0, np.radians(60.0)))
     safe = 60.0 * edit.safe_fraction()
     assert 29.0 < safe < 30.5 and least(safe) > 0.0
 

@@ -12,7 +12,7 @@ from benchmarks.common.machine import Machine
 from benchmarks.common.tables import Table, number
 from benchmarks.common.timing import interleaved
 from cagefield.cameras.camera import Camera
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Continuous, Discrete, Edit, EditStack
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import Cage
@@ -139,8 +139,13 @@ def default_edit(scene: Scene, cameras: Sequence[Camera]) -> Edit:
         box = np.stack([middle - size / 2, middle + size / 2])
         low, high = (size, high) if covered(box[None], cameras) < COVERED else (low, size)
     outer = Cage.box(middle, high)
-    edit = Edit(Cage.box(middle, high / 2), outer, name="turn and grow")
+    edit = Edit.continuous(Cage.box(middle, high / 2), outer, name="turn and grow")
     return edit.rotate((0.0, 0.0, np.radians(15.0))).scale(1.1)
+
+
+def as_move(edit: Edit) -> Edit:
+    """The same motion as a discrete move."""
+    return Edit.move(edit.inner, operations=edit.operations, **edit.shared_options)
 
 
 def covered(boxes: NDArray[np.float64], cameras: Sequence[Camera]) -> float:
@@ -159,15 +164,15 @@ def covered(boxes: NDArray[np.float64], cameras: Sequence[Camera]) -> float:
 
 def _variants(edits: EditStack, lattices: Sequence[int | None]) -> dict[str, EditStack]:
     """Name -> stack: the edits with each lattice, and as discrete edits where they are not already."""
-    if all(edit.adjustment == "discrete" for edit in edits.active):
+    if all(isinstance(edit, Discrete) for edit in edits.active):
         return {"discrete": edits}
     stacks = {
         "continuous, exact" if nodes is None else f"continuous, lattice {nodes}": EditStack(
-            edit if edit.adjustment == "discrete" else edit.replace(lattice=nodes) for edit in edits
+            edit.replace(lattice=nodes) if isinstance(edit, Continuous) else edit for edit in edits
         )
         for nodes in lattices
     }
-    stacks["discrete"] = EditStack(edit.replace(adjustment="discrete", lattice=None) for edit in edits)
+    stacks["discrete"] = EditStack(as_move(edit) if isinstance(edit, Continuous) else edit for edit in edits)
     return stacks
 
 

@@ -13,7 +13,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from cagefield.edits import EditStack
+from cagefield.edits import Continuous, Delete, EditStack, Move
 from cagefield.edits.edit_files import parse_edits
 from cagefield.errors import CagefieldError
 from cagefield.procedural import ProceduralScene
@@ -59,10 +59,10 @@ class Case:
     @property
     def kind(self) -> str:
         """What the edits are: continuous where one of them is, else what the first does."""
-        if any(edit.adjustment == "continuous" for edit in self.edits):
+        if any(isinstance(edit, Continuous) for edit in self.edits):
             return "continuous"
         first = self.edits[0]
-        return "delete" if first.deleted else "copy" if first.keep_source else "move"
+        return "delete" if isinstance(first, Delete) else "move" if isinstance(first, Move) else "copy"
 
 
 CASES = (

@@ -222,7 +222,7 @@ class Workbench:
         """Photos [V,H,W,3] of a built-in scene seen through the exact map of edits, over white."""
         if edits is None:
             return self.modeled(name, cameras)
-        stack = EditStack(edit.replace(lattice=None) for edit in edits)
+        stack = EditStack(edit.without_lattice() for edit in edits)
         key = digest([name, dump_edits(stack), _poses(cameras)], (*_MODELLED, *_MAPPED))
         scene = MappedScene(procedural_scene(name), exact(stack))
         what = f"{name}: exact maps"

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from benchmarks.edits.compare_shells import FINER, compared_cameras, continuous,
 from benchmarks.edits.distortion import distortion
 from benchmarks.edits.edit_quality import eye, frame_ratio
 from cagefield.cameras.camera import Camera
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Continuous, Edit, EditStack, shell_kind
 from cagefield.geometry.cage import Cage
 from cagefield.images.metrics import psnr
 from cagefield.scene.scene import Scene
@@ -72,9 +71,9 @@ class Subject:
         still, edited = (seen(scene, cameras, FINER) for scene in (self.scene, self.scene.with_edits(edits)))
         return compare(still, edited, before, after)
 
-    def with_edit(self, change: Callable[[Edit], Edit]) -> EditStack:
+    def with_edit(self, change: Callable[[Continuous], Edit]) -> EditStack:
         """The case's edits, the continuous one changed."""
-        return EditStack(change(e) if e.adjustment == "continuous" else e for e in self.case.edits)
+        return EditStack(change(e) if isinstance(e, Continuous) else e for e in self.case.edits)
 
 
 def outer_size(subject: Subject, gaps: Sequence[float] = GAPS) -> Ablation:
@@ -104,8 +103,8 @@ def outer_size(subject: Subject, gaps: Sequence[float] = GAPS) -> Ablation:
             (
                 "Gap: between the outer cage and a box around the inner cage before and after the edit, as a "
                 "share of the inner cage's mean edge.",
-                f"Shell: {edit.shell}. PSNR: of the field through the map against the scene's model through "
-                "the same map.",
+                f"Shell: {edit.shell.name}. PSNR: of the field through the map against the scene's model "
+                "through the same map.",
             ),
         ),
         strip([panels]),
@@ -118,11 +117,11 @@ def resolution(subject: Subject, resolutions: Sequence[int] = RESOLUTIONS) -> Ab
     pictures: list[list[Panel]] = []
     voxel = subject.scene.field.sample_spacing
     for shell in ("flow", "trilinear"):
-        exact = subject.with_edit(lambda e, s=shell: e.replace(shell=s, lattice=None))  # type: ignore[misc]
+        exact = subject.with_edit(lambda e, s=shell: e.replace(shell=shell_kind(s), lattice=None))  # type: ignore[misc]
         frames, large = seen(subject.scene.with_edits(exact), subject.cameras), subject.picture(exact)
         line: list[Panel] = [(f"{shell}, exact", large)]
         for nodes in (*resolutions, None):
-            stack = EditStack(e.replace(lattice=nodes) if e.adjustment == "continuous" else e for e in exact)
+            stack = EditStack(e.replace(lattice=nodes) if isinstance(e, Continuous) else e for e in exact)
             edited = subject.scene.with_edits(stack)
             worst, mean = continuous_of(stack).lattice_error(samples=_POINTS)
             same = psnr(seen(edited, subject.cameras), frames)
@@ -163,10 +162,10 @@ def resolution(subject: Subject, resolutions: Sequence[int] = RESOLUTIONS) -> Ab
 
 def discrete_continuous(subject: Subject) -> Ablation:
     """The same motion as a discrete move, a copy and a continuous edit."""
-    kinds: dict[str, Callable[[Edit], Edit]] = {
+    kinds: dict[str, Callable[[Continuous], Edit]] = {
         "continuous": lambda e: e,
-        "discrete": lambda e: e.replace(**_DISCRETE),
-        "discrete copy": lambda e: e.replace(**_DISCRETE, keep_source=True),
+        "discrete": lambda e: Edit.move(e.inner, operations=e.operations, **e.shared_options),
+        "discrete copy": lambda e: Edit.copy(e.inner, operations=e.operations, **e.shared_options),
     }
     rows: list[tuple[str, ...]] = []
     panels: list[Panel] = [("before", subject.picture(EditStack([])))]
@@ -195,15 +194,9 @@ def discrete_continuous(subject: Subject) -> Ablation:
     )
 
 
-_DISCRETE: dict[str, Any] = {
-    "adjustment": "discrete", "outer": None, "shell": "flow", "lattice": None, "falloff": "smooth",
-    "width": 1.0,
-}  # fmt: skip
-
-
-def continuous_of(stack: EditStack) -> Edit:
+def continuous_of(stack: EditStack) -> Continuous:
     """The one continuous edit of a stack."""
-    (edit,) = (edit for edit in stack if edit.adjustment == "continuous")
+    (edit,) = (edit for edit in stack if isinstance(edit, Continuous))
     return edit
 
 

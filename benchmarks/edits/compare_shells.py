@@ -18,10 +18,10 @@ from benchmarks.common.figures import Figures, compare, stacked, supersampled
 from benchmarks.common.tables import Table, number
 from benchmarks.common.workbench import Workbench
 from benchmarks.edits.distortion import Distortion, distortion, shell_points
-from benchmarks.edits.methods import MAPS, METHODS, PEER_LATTICE, Method, check_known, peers
+from benchmarks.edits.methods import MAPS, METHODS, PEER_LATTICE, Method, check_known
 from cagefield.cameras.camera import Camera
-from cagefield.edits import Edit, EditStack
-from cagefield.edits.device.device_stack import DeviceStack
+from cagefield.edits import Continuous, EditStack
+from cagefield.edits.device_stack import DeviceStack
 from cagefield.errors import CagefieldError
 from cagefield.images.render_result import RenderResult
 from cagefield.scene.scene import Scene
@@ -59,9 +59,9 @@ class Comparison:
     figures: Figures
 
 
-def continuous(case: Case) -> Edit:
+def continuous(case: Case) -> Continuous:
     """The continuous edit of a case. Raises CagefieldError where it has none or several."""
-    found = [edit for edit in case.edits if edit.adjustment == "continuous"]
+    found = [edit for edit in case.edits if isinstance(edit, Continuous)]
     if len(found) != 1:
         raise CagefieldError(f"{case.scene} {case.name} has {len(found)} continuous edits; it must have one")
     return found[0]
@@ -74,11 +74,6 @@ def measure(cases: Sequence[Case], methods: Sequence[str], bench: Workbench) -> 
         CagefieldError: an unknown method.
     """
     check_known(methods)
-    with peers():
-        yield from _measured(cases, methods, bench)
-
-
-def _measured(cases: Sequence[Case], methods: Sequence[str], bench: Workbench) -> Iterator[Comparison]:
     maps: dict[tuple[str, str, str], Distortion] = {}
     for case in cases:
         if case.kind != "continuous":
@@ -119,7 +114,7 @@ def shown(scene: Scene, camera: Camera) -> RenderResult:
 
 def map_time(edits: EditStack) -> MapTime:
     """The time of a stack's map in the renderer's kernel, at points of the deformed shell."""
-    (edit,) = (edit for edit in edits if edit.adjustment == "continuous")
+    (edit,) = (edit for edit in edits if isinstance(edit, Continuous))
     points = shell_points(edit, _TIMED_POINTS).astype(np.float32)
     viewdirs = np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), points.shape)
     # Under another name, as what is made of an edit is kept for all that equal it.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.edits.methods import BackwardMap
-from cagefield.edits import Edit
+from cagefield.edits import Continuous, Edit
 from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
@@ -94,6 +94,6 @@ def shell_samples(inner: Cage, outer: Cage, count: int, seed: int = 0) -> Array:
 
 
 def _outer(edit: Edit) -> Cage:
-    if edit.outer is None:
+    if not isinstance(edit, Continuous):
         raise CagefieldError(f'edit "{edit.name}" has no outer cage, so there is no shell to measure')
     return edit.outer

@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.edits import EditStack
-from cagefield.edits.device.device_stack import DeviceStack
+from cagefield.edits import Continuous, EditStack
+from cagefield.edits.device_stack import DeviceStack
 from cagefield.rendering.reference_renderer import PointMap
 from cagefield.typing import Array
 
@@ -64,6 +64,6 @@ class BoxedMap(PointMap, Protocol):
 
 def exact(edits: EditStack) -> BoxedMap:
     """The stack's map without its lattices, by the kernel where all its shells have one."""
-    stack = EditStack(edit.replace(lattice=None) for edit in edits)
-    shells = {edit.shell for edit in stack.active if edit.adjustment == "continuous"}
+    stack = EditStack(edit.without_lattice() for edit in edits)
+    shells = {edit.shell.name for edit in stack.active if isinstance(edit, Continuous)}
     return KernelMap(stack) if shells <= set(_WITH_KERNEL) else stack

@@ -116,7 +116,7 @@ def _shots(case: Case, bench: Workbench, front: Camera, cameras: Sequence[Camera
     model, scene = procedural_scene(case.scene), bench.scene(case.scene)
     moved = model if case.moved is None else case.moved(model)
     center, extent = model.part_box(model.part_names, 0.05)
-    turn = Edit(Cage.box(center, extent), adjustment="discrete").rotate((0.0, 0.0, np.pi))
+    turn = Edit.move(Cage.box(center, extent)).rotate((0.0, 0.0, np.pi))
     turned = model.move(model.part_names, rotate=(0.0, 0.0, np.pi), pivot=center).with_modeled_light()
     alone = EditStack(edit.replace(fill="none", relight="none") for edit in case.edits)
     turn = turn.replace(fill="none", relight="none")

@@ -1,41 +1,32 @@
-"""Ways to fill the shell of a continuous edit, by name: ours, the paper's, and stand-ins for the peers'.
-
-Within `peers()` an edit takes the peers' shells by name, and is evaluated and rendered with them.
-"""
+"""Ways to fill the shell of a continuous edit, by name: ours, the paper's, and stand-ins for the peers'."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from benchmarks.edits.baselines import PEERS, PeerShell
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Continuous, Edit, EditStack, Flow, ShellKind, shell_kind
 from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
-from cagefield.warps import SHELLS, Falloff, Shell
+from cagefield.warps import Shell
 from cagefield.warps.interfaces import Mapped
 
 
-def _as_shell(name: str) -> Callable[[Cage, Cage, Cage, Falloff], Shell]:
-    def build(inner: Cage, deformed: Cage, outer: Cage, _falloff: Falloff) -> Shell:
-        return PeerShell(PEERS[name](inner, deformed, outer), deformed, outer)
+@dataclass(frozen=True)
+class Peer(ShellKind):
+    """Stand-in for a peer's shell map, by its name in `peers.PEERS`."""
 
-    return build
+    peer: str
 
+    @property
+    def name(self) -> str:
+        return self.peer
 
-@contextmanager
-def peers() -> Iterator[None]:
-    """A context in which the peers are in `warps.SHELLS`, for edits that are made and evaluated there."""
-    added = {name: _as_shell(name) for name in PEERS if name not in SHELLS}
-    SHELLS.update(added)
-    try:
-        yield
-    finally:
-        for name in added:
-            del SHELLS[name]
+    def build(self, inner: Cage, deformed: Cage, outer: Cage) -> Shell:
+        return PeerShell(PEERS[self.peer](inner, deformed, outer), deformed, outer)
 
 
 PEER_LATTICE = 96
@@ -50,11 +41,13 @@ class Method:
     lattice: int | None = None
 
     def of(self, edit: Edit) -> Edit:
-        """The edit with this method in its shell; a discrete edit stays as it is. Peers: within `peers`."""
-        if edit.adjustment == "discrete":
+        """The edit with this method in its shell; a discrete edit stays as it is."""
+        if not isinstance(edit, Continuous):
             return edit
-        falloff = {} if self.shell == "flow" else {"falloff": "smooth", "width": 1.0}
-        return edit.replace(shell=self.shell, lattice=self.lattice, allow_folding=True, **falloff)
+        kind = Peer(self.shell) if self.shell in PEERS else shell_kind(self.shell)
+        if isinstance(kind, Flow) and isinstance(edit.shell, Flow):
+            kind = edit.shell
+        return edit.replace(shell=kind, lattice=self.lattice, allow_folding=True)
 
     def of_all(self, edits: EditStack) -> EditStack:
         """The stack with this method in all its shells."""
@@ -92,10 +85,9 @@ def exact_map(name: str, edit: Edit) -> BackwardMap:
         EditError: an inner cage that is not inside the outer one.
     """
     check_known((name,), MAPS)
-    if edit.adjustment != "continuous":
+    if not isinstance(edit, Continuous):
         raise CagefieldError(f'edit "{edit.name}" is discrete and has no shell; choose a continuous edit')
-    with peers():
-        return Method(name).of(edit).exact_warp
+    return Method(name).of(edit).exact_warp
 
 
 def check_known(names: Sequence[str], known: Sequence[str] = tuple(METHODS)) -> None:

@@ -15,7 +15,7 @@ from scipy import ndimage
 
 from benchmarks.edits.distortion import Distortion, distortion
 from benchmarks.edits.methods import BackwardMap, exact_map
-from cagefield.edits import Edit
+from cagefield.edits import Continuous, Edit
 from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, UInt8
@@ -58,13 +58,13 @@ class Style:
             raise CagefieldError(f"panel is {self.panel}; it must be at least 16 pixels")
 
 
-def turned(degrees: float) -> Edit:
+def turned(degrees: float) -> Continuous:
     """The edit of the pictures: a box of half-size 0.3 in one of 0.8, turned about z."""
-    edit = Edit(Cage.box((0, 0, 0), 2 * INNER), Cage.box((0, 0, 0), 2 * OUTER), allow_folding=True)
+    edit = Edit.continuous(Cage.box((0, 0, 0), 2 * INNER), Cage.box((0, 0, 0), 2 * OUTER), allow_folding=True)
     return edit.rotate((0.0, 0.0, np.radians(degrees)))
 
 
-def lattice_picture(warp: BackwardMap, edit: Edit, side: int, spacing: float) -> UInt8:
+def lattice_picture(warp: BackwardMap, edit: Continuous, side: int, spacing: float) -> UInt8:
     """Picture [side, side, 3] of the plane z = 0 in deformed space, y upwards."""
     points = _plane(side)
     mapped = warp.to_canonical(points)
@@ -77,7 +77,7 @@ def lattice_picture(warp: BackwardMap, edit: Edit, side: int, spacing: float) ->
         away = np.abs(value - np.round(value)) * spacing / np.maximum(slope, 1e-9)
         line = np.maximum(line, (1.05 - away / pixel).clip(0.0, 1.0))
     in_inner = edit.deformed.contains(points)
-    in_outer = in_inner if edit.outer is None else edit.outer.contains(points)
+    in_outer = edit.outer.contains(points)
     red = _inside_out(warp, edit, np.linalg.det(mapped.jacobian), side) * in_outer
     paper, ink = np.empty((2, len(points), 3))
     for colours, plain, shell, inside in ((paper, _PAPER, _SHELL, _INSIDE), (ink, _FAINT, _INK, _BLUE)):
@@ -95,7 +95,7 @@ def _plane(side: int) -> Array:
     return np.stack([x.ravel(), y.ravel(), np.zeros(side * side)], axis=1)
 
 
-def _inside_out(warp: BackwardMap, edit: Edit, det: Array, side: int) -> Array:
+def _inside_out(warp: BackwardMap, edit: Continuous, det: Array, side: int) -> Array:
     """Share [N] of each pixel that a map of determinant det [N] shows inside out.
 
     For the trilinear shell, of which a pixel shows one sheet: that any sheet lands on inside out, be it under
@@ -160,11 +160,9 @@ def caption(measured: Distortion) -> str:
     return f"folds: min det J {measured.least_det:.2f}"
 
 
-def _outlines(draw: ImageDraw.ImageDraw, edit: Edit, at: tuple[int, int], panel: int) -> None:
+def _outlines(draw: ImageDraw.ImageDraw, edit: Continuous, at: tuple[int, int], panel: int) -> None:
     """Draws where both cages cut the plane: the outer's box and the turned inner one's."""
     for cage, colour in ((edit.outer, _INK), (edit.deformed, _BLUE)):
-        if cage is None:
-            continue
         corners = 0.5 * (cage.corners[:4] + cage.corners[4:])[[0, 1, 3, 2], :2]
         x = at[0] + (corners[:, 0] + VIEW) / (2 * VIEW) * panel
         y = at[1] + (VIEW - corners[:, 1]) / (2 * VIEW) * panel

@@ -27,25 +27,20 @@ class Reader:
 
 def example_edits() -> EditStack:
     inner = Cage.box((0.0, 0.0, 0.0), (0.5, 0.5, 0.5), (0.0, 0.1, 0.2))
-    moved = Edit(
+    moved = Edit.continuous(
         inner,
+        inner.grown((0.4, 0.4, 0.4)),
+        lattice=16,
         operations=(
             Translate((0.1, 0.0, 0.0)),
             Rotate((0.0, 0.0, 10.0)),
             Scale((1.1, 1.0, 1.0)),
             MoveCorner(3, (0.02, 0.0, 0.0)),
         ),
-        outer=inner.grown((0.4, 0.4, 0.4)),
         name="arm up",
-        lattice=16,
     )
-    other = Edit(
-        Cage.box((0.3, 0.3, 0.0), (0.2, 0.2, 0.2)),
-        operations=(Translate((0.0, 0.3, 0.0)),),
-        adjustment="discrete",
-        keep_source=True,
-    )
-    gone = Edit(Cage.box((-0.3, 0.3, 0.0), (0.2, 0.2, 0.2)), deleted=True, adjustment="discrete")
+    other = Edit.copy(Cage.box((0.3, 0.3, 0.0), (0.2, 0.2, 0.2)), operations=(Translate((0.0, 0.3, 0.0)),))
+    gone = Edit.delete(Cage.box((-0.3, 0.3, 0.0), (0.2, 0.2, 0.2)))
     return EditStack([moved, other, gone])
 
 

@@ -31,7 +31,7 @@ class ApplyEdits:
     def run(self) -> None:
         """Check every edit, write the scene, print the changes."""
         from cagefield.cli.report import describe_edits
-        from cagefield.edits import EditStack
+        from cagefield.edits import EditStack, Paste
         from cagefield.edits.edit_files import load_edits
         from cagefield.edits.paste_paths import rebased
         from cagefield.scene.scene import Scene
@@ -50,7 +50,7 @@ class ApplyEdits:
             stack = EditStack([*scene.edits, *stack])
         stack.check()
         for edit in stack:
-            if edit.source is not None and edit.enabled:
+            if isinstance(edit, Paste) and edit.enabled:
                 scene.with_edits(EditStack([edit.replace(relight="none")])).patched_edits  # noqa: B018  a scene that is not there
         lines = describe_edits(stack, scene.field)
         if not self.check:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.edits import Continuous, Copy, Delete, Discrete, Paste
 from cagefield.edits.options import Clone
 from cagefield.errors import EditError
 from cagefield.fields.contraction import uncontract
@@ -64,36 +65,36 @@ def describe_edits(edits: Iterable[Edit], field: VoxelField | SplatField) -> lis
 def _title(edit: Edit) -> str:
     name = f'"{edit.name}": ' if edit.name else ""
     hidden = "" if edit.enabled else " (hidden)"
-    if edit.deleted:
+    if isinstance(edit, Delete):
         kind = "delete"
-    elif edit.source is not None:
+    elif isinstance(edit, Paste):
         kind = f"paste from {edit.source}"
-    elif edit.adjustment == "discrete":
-        kind = "discrete copy" if edit.keep_source else "discrete move"
-    else:
+    elif isinstance(edit, Continuous):
         how = "exact" if edit.lattice is None else f"lattice of {edit.lattice}^3 nodes"
-        kind = f"continuous, {edit.shell} shell, {how}"
+        kind = f"continuous, {edit.shell.name} shell, {how}"
+    else:
+        kind = "discrete copy" if isinstance(edit, Copy) else "discrete move"
     return f"{name}{kind}{_left_out(edit)}{hidden}"
 
 
 def _left_out(edit: Edit) -> str:
     """Options by which a discrete edit leaves its surroundings unchanged, as text."""
-    if edit.adjustment == "continuous":
+    if not isinstance(edit, Discrete):
         return ""
     word = "clone" if isinstance(edit.fill, Clone) else edit.fill
-    fill = f", fill: {word}" if word != "surroundings" and not edit.keep_source else ""
+    fill = f", fill: {word}" if word != "surroundings" and edit.uncovers else ""
     return fill + (", relight: none" if edit.relight == "none" else "")
 
 
 def _details(edit: Edit, content: _Content) -> Iterable[str]:
     inside = edit.inner.contains(content.positions)
     share = content.share(inside)
-    if edit.deleted:
+    if isinstance(edit, Delete):
         yield f"empties {share:.1%} of the field's {content.noun}"
         return
     for operation in edit.operations:
         yield f"{operation.noun} {operation}"
-    if edit.source is not None:
+    if isinstance(edit, Paste):
         low, high = edit.deformed.aabb
         box = " x ".join(f"{edge:.4g}" for edge in high - low)
         yield f"shows what its cage holds there in {box} around {format_vector(0.5 * (low + high))}"
@@ -117,7 +118,7 @@ def _details(edit: Edit, content: _Content) -> Iterable[str]:
         ratio = warp.shell.least_ratio()
         state = "does not fold" if ratio > 0.0 else "folds, and is allowed to"
         yield f"{gives:.1%} of them give way; the shell {state} (least volume ratio {ratio:.3f})"
-        if edit.lattice is not None:
+        if isinstance(edit, Continuous) and edit.lattice is not None:
             worst, mean = edit.lattice_error()
             mean, worst = mean / content.length, worst / content.length
             yield f"the lattice is off by {mean:.2g} {content.lengths} on average, {worst:.2g} at most"

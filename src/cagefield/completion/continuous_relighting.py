@@ -32,9 +32,8 @@ from cagefield.completion.surfaces.support_plane import Support, find_support
 from cagefield.completion.surfaces.surface_color import denoise_colors
 from cagefield.completion.surfaces.surfels import Surfels, extract_surfels
 from cagefield.completion.surfaces.visibility import DEPTH_TOLERANCE_VOXELS, MIN_VIEWS, CameraVisibility
-from cagefield.edits import Edit
+from cagefield.edits import Continuous, Edit, EditMap, PreparedEdit
 from cagefield.edits.patch import Patch, SplatPatch
-from cagefield.edits.stack import EditStack
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Mask
@@ -55,12 +54,11 @@ MIN_BENT_LOG_CHANGE = 0.03
 """Minimum change of light (log); smaller ones are dropped."""
 
 
-def light_box(edit: Edit, voxel: float, max_radius: float, shadow_directions: Array) -> Array:
+def light_box(edit: Continuous, voxel: float, max_radius: float, shadow_directions: Array) -> Array:
     """World-space box [2,3] (min, max) in which a continuous edit changes light.
 
     Arguments as in `patch_box`.
     """
-    assert edit.outer is not None
     margin = 1.5 * max_radius + SUPPORT_DISTANCE_VOXELS * voxel
     return np.asarray(extrude_box(edit.outer.aabb, shadow_directions) + margin * np.array([[-1.0], [1.0]]))
 
@@ -79,9 +77,8 @@ class BentLight:
     light: LightChange
 
 
-def compute_bent_light(block: GridBlock, edit: Edit, model: LightModel) -> BentLight:
+def compute_bent_light(block: GridBlock, edit: Continuous, model: LightModel) -> BentLight:
     """Change of light of a block by a continuous edit."""
-    assert edit.outer is not None
     coarse = block.pool(max(1, -(-max(block.shape) // MAX_VERTICES_PER_AXIS))).pad_to(edit.outer.aabb)
     surface, _ = snap_to_planes(extract_surfels(coarse), max(coarse.spacing))
     if not len(surface.points):
@@ -95,7 +92,7 @@ def compute_bent_light(block: GridBlock, edit: Edit, model: LightModel) -> BentL
     return BentLight(coarse, surface, log - diffuse, light)
 
 
-def extract_bent_block(field: VoxelField, below: EditStack, edit: Edit, model: LightModel) -> GridBlock:
+def extract_bent_block(field: VoxelField, below: EditMap, edit: Continuous, model: LightModel) -> GridBlock:
     """Block of a voxel field, under the edits below, in which a continuous edit changes light."""
     return extract_block(
         field,
@@ -106,12 +103,12 @@ def extract_bent_block(field: VoxelField, below: EditStack, edit: Edit, model: L
 
 def relight_voxels(
     field: VoxelField,
-    below: EditStack,
-    edit: Edit,
+    below: EditMap,
+    edit: Continuous,
     model: LightModel,
     block: GridBlock | None = None,
     visibility: CameraVisibility | None = None,
-) -> Edit | None:
+) -> PreparedEdit | None:
     """Edit that changes the light of a voxel field under a continuous edit; None if no light changes.
 
     `block` is its `extract_bent_block`, if that is known. With `fill` "surroundings" the support in deep
@@ -139,7 +136,7 @@ def apply_bent_light(block: GridBlock, bent: BentLight) -> tuple[GridBlock, Ligh
 
 
 def inpaint_shaded_support(
-    block: GridBlock, edit: Edit, bent: BentLight, below: EditStack, visibility: CameraVisibility | None
+    block: GridBlock, edit: Continuous, bent: BentLight, below: EditMap, visibility: CameraVisibility | None
 ) -> tuple[GridBlock, Support | None]:
     """(block with the support inpainted where it was in deep shade, the support or None).
 
@@ -189,7 +186,7 @@ def _inpaint_shaded(
     coordinates: Array,
     is_dark: NDArray[np.bool_],
     support: Support,
-    below: EditStack,
+    below: EditMap,
     visibility: CameraVisibility | None,
 ) -> GridBlock | None:
     """Block with a support inpainted; None without a footprint.
@@ -217,8 +214,8 @@ def _inpaint_shaded(
     return inpaint_support(block, replace(footprint, log_light_change=log_change), inside, keep_removed=True)
 
 
-def light_edit(edit: Edit, patch: Patch | SplatPatch) -> Edit:
+def light_edit(edit: Edit, patch: Patch | SplatPatch) -> PreparedEdit:
     """Edit that moves nothing and shows the patch with the light of another edit."""
     low, high = patch.region.aabb
     nothing = Cage.box(low, 1e-6 * (high - low))
-    return Edit.delete(nothing, name=edit.name).replace(fill="none", relight="none", patch=patch)
+    return PreparedEdit(Edit.delete(nothing, name=edit.name, fill="none", relight="none"), patch)

@@ -23,10 +23,9 @@ from cagefield.completion.surfaces.footprint import Footprint, build_footprint
 from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.support_plane import Support
 from cagefield.completion.surfaces.visibility import MIN_VIEWS, CameraVisibility, count_edited_views
-from cagefield.edits import Edit
+from cagefield.edits import Delete, Discrete, EditMap, Paste
 from cagefield.edits.options import Clone
-from cagefield.edits.patch import Patch
-from cagefield.edits.stack import EditStack
+from cagefield.edits.patch import Pasted, Patch
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.typing import Mask
 
@@ -70,14 +69,15 @@ class PatchResult:
 
 def compute_patch(
     field: VoxelField,
-    below: EditStack,
-    edit: Edit,
+    below: EditMap,
+    edit: Discrete,
     model: LightModel | None,
     *,
     include_destination: bool = True,
     visibility: CameraVisibility | None = None,
     preserve_opacity: bool = True,
     after: VoxelField | None = None,
+    pasted: Pasted | None = None,
 ) -> PatchResult:
     """Patch of a discrete edit of a field under the edits below, on a grid block.
 
@@ -90,12 +90,12 @@ def compute_patch(
         after: the field with a paste, if `edit` does not hold the paste's content.
     """
     context = EditContext.build(
-        field, below, edit, model, include_destination, preserve_opacity, after, visibility
+        field, below, edit, model, include_destination, preserve_opacity, after, visibility, pasted
     )
     light = part_light = footprint = support = None
     active_model = model if model is not None and model.has_effect else None
     under, log_change, strength = context.emptied, np.zeros(len(context.light_surfels.points)), 1.0
-    part_support = context.find_support() if edit.source is None else None
+    part_support = context.find_support() if not isinstance(edit, Paste) else None
     if active_model is not None:
         if part_support is not None:
             strength = fit_shadow_strength(
@@ -110,7 +110,7 @@ def compute_patch(
         log_change = strength * context.light_change_without_part(active_model)
         light = LightChange.from_surfels(under, context.light_surfels, log_change, context.light_spacing)
         under = apply_light(under, light)
-    if edit.fill == "surroundings" and not edit.keep_source:
+    if edit.fill == "surroundings" and edit.uncovers:
         support = part_support
     if support is not None:
         shaded = context.light_surfels.take(log_change > MAX_TRUSTED_LOG_GAIN)
@@ -128,7 +128,7 @@ def compute_patch(
         support = footprint = None
     else:
         under = inpaint_support(under, _with_light_change(footprint, under, light), context.inside)
-    if isinstance(edit.fill, Clone) and not edit.keep_source:
+    if isinstance(edit.fill, Clone) and edit.uncovers:
         cages = edit.inner, edit.fill.source
         under = clone_cage(under, below, cages, context.inside, context.surface, preserve_opacity)
     if active_model is not None and light is not None and context.include_destination:
@@ -153,13 +153,14 @@ def _with_light_change(footprint: Footprint, block: GridBlock, light: LightChang
 
 def build_patch(
     field: VoxelField,
-    below: EditStack,
-    edit: Edit,
+    below: EditMap,
+    edit: Discrete,
     model: LightModel | None,
     *,
     include_destination: bool = True,
     visibility: CameraVisibility | None = None,
     preserve_opacity: bool = True,
+    pasted: Pasted | None = None,
 ) -> Patch:
     """Patch of a discrete edit of a voxel field; arguments as in `compute_patch`."""
     result = compute_patch(
@@ -170,11 +171,12 @@ def build_patch(
         include_destination=include_destination,
         visibility=visibility,
         preserve_opacity=preserve_opacity,
+        pasted=pasted,
     )
     mask = result.under.changed_from(result.before) | result.inside
     region, under = result.under.crop_to_changes(mask, result.context.region)
     part_block = apply_light(result.before, result.part_light)
-    if include_destination and edit.source is None and edit.fill != "none" and not edit.deleted:
+    if include_destination and not isinstance(edit, Delete | Paste) and edit.fill != "none":
         part_block = close_cut_end(
             part_block, result.inside, result.context.removed, result.part_light, below, visibility
         )

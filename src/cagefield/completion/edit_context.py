@@ -26,8 +26,8 @@ from cagefield.completion.surfaces.surfels import (
     prefer_visible,
 )
 from cagefield.completion.surfaces.visibility import CameraVisibility
-from cagefield.edits import Edit
-from cagefield.edits.stack import EditStack
+from cagefield.edits import Delete, Discrete, EditMap, Paste, PreparedEdit, PreparedStack
+from cagefield.edits.patch import Pasted
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Mask
@@ -63,7 +63,7 @@ class EditContext:
         pasted: all surfels with a paste; None of another edit.
     """
 
-    edit: Edit
+    edit: Discrete
     region: Cage
     before: GridBlock
     emptied: GridBlock
@@ -78,22 +78,23 @@ class EditContext:
     def build(
         cls,
         field: VoxelField,
-        below: EditStack,
-        edit: Edit,
+        below: EditMap,
+        edit: Discrete,
         model: LightModel | None,
         include_destination: bool,
         preserve_opacity: bool,
         after: VoxelField | None,
         visibility: CameraVisibility | None,
+        pasted: Pasted | None = None,
     ) -> EditContext:
         """Context of an edit of a field under the edits below.
 
-        model: the light model, None to leave light as it is; after: the field with a paste, if `edit` does
-        not hold its content.
+        model: the light model, None to leave light as it is; after: the field with a paste, or None to
+        compose it from `pasted`, the content of the paste.
         """
         # The field's visible surfaces are not where the edits below have moved them.
-        visibility = None if below.active else visibility
-        include_destination = include_destination and not edit.deleted
+        visibility = None if below.steps else visibility
+        include_destination = include_destination and not isinstance(edit, Delete)
         voxel = float(field.voxel_size.max())
         active_model = model if model is not None and model.has_effect else LightModel((), ())
         light_spacing = min(
@@ -108,11 +109,9 @@ class EditContext:
         )
         before = extract_block(field, below, box, preserve_opacity=preserve_opacity)
         region = Cage.box(box.mean(axis=0), box[1] - box[0] - 2.0 * voxel)
-        if edit.source is not None:
-            shown_field, stack = (field, below.append(edit)) if after is None else (after, EditStack())
-            pasted = extract_surfels(
-                extract_block(shown_field, stack, box, preserve_opacity=preserve_opacity)
-            )
+        if isinstance(edit, Paste):
+            stack = PreparedStack() if after else below.followed_by(PreparedEdit(edit, pasted=pasted))
+            block = extract_block(after or field, stack, box, preserve_opacity=preserve_opacity)
             none = np.zeros(before.shape, bool)
             return cls(
                 edit,
@@ -124,11 +123,11 @@ class EditContext:
                 include_destination,
                 visibility,
                 light_spacing,
-                pasted,
+                extract_surfels(block),
             )
         inside = edit.inner.contains(before.positions(np.ones(before.shape, bool))).reshape(before.shape)
         emptied = before
-        if not edit.keep_source:
+        if edit.uncovers:
             # Keep negative densities: the trilinear zero crossing places the surface at sub-voxel precision.
             emptied = before.with_density(inside, np.minimum(before.density[inside], 0.0))
         return cls(
@@ -194,13 +193,13 @@ class EditContext:
             surface = prefer_visible(surface, self.visibility.surface.crop_to_block(self.before), self.voxel)
         surface = surface.downsample(self.voxel)
         probes = surface.points - PROBE_DEPTH_VOXELS * self.voxel * surface.normals
-        return surface, np.asarray(self.edit.inner.contains(probes) & (self.edit.source is None))
+        return surface, np.asarray(self.edit.inner.contains(probes) & (not isinstance(self.edit, Paste)))
 
     @cached_property
     def remaining(self) -> Surfels:
         """Surfels after the removal: all without the part, or all where the edit keeps its source."""
         surface, _ = self._surfels
-        return surface if self.edit.keep_source else self.surroundings
+        return self.surroundings if self.edit.uncovers else surface
 
     @cached_property
     def removed(self) -> Surfels:
@@ -224,7 +223,7 @@ class EditContext:
 
         0 where the edit keeps its source.
         """
-        if self.edit.keep_source or not len(self.removed.points):
+        if not self.edit.uncovers or not len(self.removed.points):
             return np.zeros(len(self.light_surfels.points))
         return _log_light_change(
             model,
@@ -282,7 +281,7 @@ class EditContext:
 
         The part is feathered into `destination`. Vertices away from the part have no color.
         """
-        feather = self.edit.feather if self.include_destination and self.edit.source is None else 0.0
+        feather = self.edit.feather if self.include_destination and not isinstance(self.edit, Paste) else 0.0
         if block is self.before and feather == 0.0:
             return None
         if feather > 0.0:

@@ -31,7 +31,7 @@ from cagefield.completion.lighting.diffuse_irradiance import DiffuseLight
 from cagefield.completion.lighting.directional_light import DirectionalLight
 from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.completion.surfaces.visibility import CameraVisibility, SurfacePairs
-from cagefield.edits import Edit
+from cagefield.edits import Edit, Paste
 from cagefield.edits.patch import NewLight, Patch, SplatPatch
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
@@ -192,7 +192,7 @@ class DiskCache:
             for each in value:
                 self._update_digest(digest, each)
         elif dataclasses.is_dataclass(value) and not isinstance(value, type):
-            if isinstance(value, Edit) and (value.pasted is not None or value.source is not None):
+            if isinstance(value, Paste):
                 raise TypeError("the content of a paste may change")
             digest.update(type(value).__name__.encode())
             for each in _init_fields(value):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import cast
 
@@ -23,7 +24,7 @@ from cagefield.completion.splat_patch import build_splat_patch, relight_splats
 from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.splat_voxelization import voxelize_bounds
 from cagefield.completion.surfaces.visibility import CameraVisibility, render_visibility
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Continuous, Delete, Discrete, Edit, Paste, PreparedEdit, PreparedStack
 from cagefield.edits.options import CastShadow
 from cagefield.edits.patch import Pasted, Patch, SplatPatch
 from cagefield.fields.splat_field import SplatField
@@ -52,7 +53,7 @@ class Patcher:
     ) -> None:
         self._field, self._cameras, self._render, self._pastes = field, cameras, render, pastes
         self._disk_cache = DiskCache(field, cameras)
-        self._cache: OrderedDict[Key, Patch | SplatPatch | Edit | None] = OrderedDict()
+        self._cache: OrderedDict[Key, Patch | SplatPatch | PreparedEdit | None] = OrderedDict()
         self._light_block: tuple[Key, GridBlock] | None = None
         self._directional_models: dict[tuple[float, float, float] | None, LightModel] = {}
         self._composites: OrderedDict[Key, Pasted] = OrderedDict()
@@ -62,15 +63,14 @@ class Patcher:
         edits: Sequence[Edit],
         *,
         moving: bool = False,
-        bending: bool = True,
+        relight_continuous: bool = True,
         preserve_opacity: bool = True,
         proceed: Callable[[], None] | None = None,
-    ) -> EditStack:
+    ) -> PreparedStack:
         """Stack of the edits, in order, with their patches and the content of their pastes.
 
-        A continuous edit that relights is preceded by an edit with its light
-        (`completion.continuous_relighting`), except while `moving`; with `bending` False no such edit is
-        inserted, and the stack is as long as `edits`.
+        A continuous edit that relights has the change of its light (`completion.continuous_relighting`),
+        except while `moving` or with `relight_continuous` False.
 
         While an edit is `moving` its patch omits the part's shadow at the destination and so does not
         depend on the destination; an edit that stays meanwhile keeps its patch. `proceed` is called between
@@ -78,45 +78,46 @@ class Patcher:
 
         Raises `EditError` for a paste whose scene is missing or cannot be pasted.
         """
-        prepared: list[Edit] = []
-        feathers = isinstance(self._field, VoxelField)
+        prepared: list[PreparedEdit] = []
+        feathers, relights = isinstance(self._field, VoxelField), relight_continuous and not moving
+        ready = [PreparedEdit(edit) for edit in edits]
         if self._pastes is not None:
-            edits = self._pastes.read(edits, self._field, preserve_opacity=preserve_opacity, proceed=proceed)
-        for edit in edits:
-            if edit.pasted is not None and isinstance(self._field, VoxelField):
+            ready = self._pastes.read(edits, self._field, preserve_opacity=preserve_opacity, proceed=proceed)
+        for step in ready:
+            edit, below = step.edit, PreparedStack(prepared)
+            if isinstance(edit, Paste) and step.pasted is not None and isinstance(self._field, VoxelField):
                 if proceed is not None:
                     proceed()
-                edit = edit.replace(pasted=self._composite(tuple(prepared), edit, moving, preserve_opacity))
-            if needs_patch(edit, feathers=feathers):
+                composite = self._composite(below, edit, step.pasted, moving, preserve_opacity)
+                step = replace(step, pasted=composite)
+            if isinstance(edit, Discrete) and needs_patch(edit, feathers=feathers):
                 if proceed is not None:
                     proceed()
-                patch = self._patch(tuple(prepared), edit, moving, preserve_opacity)
-                edit = edit if patch is None else edit.replace(patch=patch)
-            elif bending and not moving and needs_relighting(edit):
+                patch = self._patch(below, edit, step.pasted, moving, preserve_opacity)
+                step = replace(step, patch=patch)
+            elif relights and isinstance(edit, Continuous) and needs_relighting(edit):
                 if proceed is not None:
                     proceed()
-                light = self._build_light(tuple(prepared), edit)
-                prepared += [] if light is None else [light]
-            prepared.append(edit)
+                step = replace(step, light=self._build_light(below, edit))
+            prepared.append(step)
         while len(self._composites) > max(MAX_CACHED_PATCHES, len(prepared)):
             self._composites.popitem(last=False)
-        return EditStack(prepared)
+        return PreparedStack(prepared)
 
     def _composite(
-        self, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
-    ) -> Pasted | None:
+        self, below: PreparedStack, edit: Paste, pasted: Pasted, moving: bool, preserve_opacity: bool
+    ) -> Pasted:
         """Content of a paste, composited with the field beneath.
 
         While the paste moves, its content alone, unless the composite is cached.
         """
         assert isinstance(self._field, VoxelField)  # splats need no compositing
-        stack = EditStack(below)
-        key: Key = (*stack.active, edit.pasted, edit.deformed, preserve_opacity)
+        key: Key = (*below.steps, pasted, edit.deformed, preserve_opacity)
         if key not in self._composites:
             if moving:
-                return edit.pasted
+                return pasted
             self._composites[key] = composite_paste(
-                self._field, stack, edit, preserve_opacity=preserve_opacity
+                self._field, below, edit, pasted, preserve_opacity=preserve_opacity
             )
         self._composites.move_to_end(key)
         return self._composites[key]
@@ -162,19 +163,23 @@ class Patcher:
         )
 
     def _patch(
-        self, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
+        self,
+        below: PreparedStack,
+        edit: Discrete,
+        pasted: Pasted | None,
+        moving: bool,
+        preserve_opacity: bool,
     ) -> Patch | SplatPatch | None:
         """Patch of a discrete edit; None for an edit that needs none while it moves."""
-        stack = EditStack(below)
         # A drag does not wait for the fit of the light model.
         model_known = not moving or "light_model" in self.__dict__
         model_or_none = self._model_for(edit) if model_known else None
         has_light = model_or_none is not None and model_or_none.has_effect
-        if edit.source is not None and not has_light:
+        if isinstance(edit, Paste) and not has_light:
             return None
         feather = edit.feather if isinstance(self._field, VoxelField) else 0.0
-        kind = edit.deleted, edit.keep_source, edit.fill, feather, edit.pasted, preserve_opacity
-        base_key: Key = (*stack.active, edit.inner, *kind, has_light and edit.relight)
+        kind = type(edit), edit.fill, feather, pasted, preserve_opacity
+        base_key: Key = (*below.steps, edit.inner, *kind, has_light and edit.relight)
         final_key: Key = (*base_key, edit.deformed if has_light or feather > 0.0 else None)
         key: Key = (*base_key, "moving") if moving and final_key not in self._cache else final_key
         if key in self._cache:
@@ -183,7 +188,7 @@ class Patcher:
         if not needs_patch(edit, moving, feathers=isinstance(self._field, VoxelField)):
             return None
         model = model_or_none if has_light else None
-        needs_visibility = has_light or (edit.fill == "surroundings" and not edit.keep_source)
+        needs_visibility = has_light or (edit.fill == "surroundings" and edit.uncovers)
         visibility = (
             self._visibility if needs_visibility and (not moving or "_visibility" in self.__dict__) else None
         )
@@ -192,53 +197,59 @@ class Patcher:
             if isinstance(self._field, VoxelField):
                 return build_patch(
                     self._field,
-                    stack,
+                    below,
                     edit,
                     model,
                     include_destination=not moving,
                     visibility=visibility,
                     preserve_opacity=preserve_opacity,
+                    pasted=pasted,
                 )
             return build_splat_patch(
-                self._field, stack, edit, model, include_destination=not moving, visibility=visibility
+                self._field,
+                below,
+                edit,
+                model,
+                include_destination=not moving,
+                visibility=visibility,
+                pasted=pasted,
             )
 
-        inputs = ("patch", model, *stack.active, edit, preserve_opacity)
+        inputs = ("patch", model, *below.steps, edit, preserve_opacity)
         patch = make() if moving else self._disk_cache.get_or_make(inputs, make)
         self._store(key, patch)
         return patch
 
-    def _build_light(self, below: tuple[Edit, ...], edit: Edit) -> Edit | None:
+    def _build_light(self, below: PreparedStack, edit: Continuous) -> PreparedEdit | None:
         """Edit that changes the light under a continuous one; None if no light changes."""
         model = self._model_for(edit)
         if model is None or not model.has_effect:
             return None
-        stack = EditStack(below)
-        shape = edit.inner, edit.outer, edit.deformed, edit.shell, edit.falloff, edit.width
-        key: Key = ("light", *stack.active, *shape, edit.allow_folding, edit.relight, edit.fill)
+        shape = edit.inner, edit.outer, edit.deformed, edit.shell
+        key: Key = ("light", *below.steps, *shape, edit.allow_folding, edit.relight, edit.fill)
         if key in self._cache:
             self._cache.move_to_end(key)
-            return cast("Edit | None", self._cache[key])
+            return cast("PreparedEdit | None", self._cache[key])
 
         def make() -> Patch | SplatPatch | None:
             if isinstance(self._field, VoxelField):
                 # The block below a cage stays the same over many drags of the cage.
-                block_key: Key = (*stack.active, edit.outer, model)
+                block_key: Key = (*below.steps, edit.outer, model)
                 if self._light_block is None or self._light_block[0] != block_key:
-                    self._light_block = block_key, extract_bent_block(self._field, stack, edit, model)
+                    self._light_block = block_key, extract_bent_block(self._field, below, edit, model)
                 light = relight_voxels(
-                    self._field, stack, edit, model, self._light_block[1], self._visibility
+                    self._field, below, edit, model, self._light_block[1], self._visibility
                 )
             else:
-                light = relight_splats(self._field, stack, edit, model, self._visibility)
+                light = relight_splats(self._field, below, edit, model, self._visibility)
             return None if light is None else light.patch
 
-        patch = self._disk_cache.get_or_make(("light", model, *stack.active, edit), make)
+        patch = self._disk_cache.get_or_make(("light", model, *below.steps, edit), make)
         relighting = None if patch is None else light_edit(edit, patch)
         self._store(key, relighting)
         return relighting
 
-    def _store(self, key: Key, value: Patch | SplatPatch | Edit | None) -> None:
+    def _store(self, key: Key, value: Patch | SplatPatch | PreparedEdit | None) -> None:
         """Store a patch, and drop the oldest beyond MAX_CACHED_PATCHES."""
         self._cache[key] = value
         while len(self._cache) > MAX_CACHED_PATCHES:
@@ -250,18 +261,18 @@ def needs_patch(edit: Edit, moving: bool = False, *, feathers: bool = True) -> b
 
     `feathers`: whether the field's kind has seams to feather; splats have none.
     """
-    if edit.adjustment != "discrete" or not (edit.enabled and edit.changes_anything):
+    if not isinstance(edit, Discrete) or not (edit.enabled and edit.changes_anything):
         return False
     seam = feathers and edit.feather > 0.0
-    if edit.keep_source:
+    if not edit.uncovers:
         return not moving and (edit.relight != "none" or seam)
-    return edit.fill != "none" or edit.relight != "none" or (seam and not edit.deleted)
+    return edit.fill != "none" or edit.relight != "none" or (seam and not isinstance(edit, Delete))
 
 
 def needs_relighting(edit: Edit) -> bool:
     """Whether an edit is an enabled, possible continuous one that relights."""
     return (
-        edit.adjustment == "continuous"
+        isinstance(edit, Continuous)
         and edit.enabled
         and edit.changes_anything
         and edit.relight != "none"

@@ -26,10 +26,9 @@ from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
 from cagefield.completion.surfaces.patch_bounds import patch_box
 from cagefield.completion.surfaces.splat_voxelization import choose_voxel_size, voxelize_splats
 from cagefield.completion.surfaces.visibility import CameraVisibility
-from cagefield.edits import Edit
+from cagefield.edits import Continuous, Delete, Discrete, Edit, EditMap, EditStack, Paste, PreparedEdit
 from cagefield.edits.options import Clone
-from cagefield.edits.patch import NewLight, SplatPatch
-from cagefield.edits.stack import EditStack
+from cagefield.edits.patch import NewLight, Pasted, SplatPatch
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import Cage
 from cagefield.rendering.splats.bake_splats import where_they_are
@@ -43,19 +42,21 @@ MIN_FILL_DIFFERENCE = 0.2
 
 def build_splat_patch(
     field: SplatField,
-    below: EditStack,
-    edit: Edit,
+    below: EditMap,
+    edit: Discrete,
     model: LightModel | None,
     *,
     include_destination: bool = True,
     visibility: CameraVisibility | None = None,
+    pasted: Pasted | None = None,
 ) -> SplatPatch:
     """Patch of a discrete edit of splats under the edits below; arguments as in `compute_patch`."""
     # No feathering: splats overlap, and their seams are soft.
     edit = edit.replace(feather=0.0)
-    field = with_pasted(field, below.append(edit))
+    stack = below.followed_by(PreparedEdit(edit, pasted=pasted))
+    field = with_pasted(field, stack)
     active_model = model if model is not None and model.has_effect else LightModel((), ())
-    to_destination = include_destination and not edit.deleted
+    to_destination = include_destination and not isinstance(edit, Delete)
     moved = _crop_splats(
         field,
         moved_splats(field, below),
@@ -84,21 +85,21 @@ def build_splat_patch(
     ) + 3.0 * voxel * np.array([[-1.0], [1.0]])
     grid = voxelize_splats(splats, _include_clone_source(edit, box), voxel)
     after = None
-    if edit.source is not None:
-        pasted = _crop_splats(field, moved_splats(field, below.append(edit)), box)
-        after = voxelize_splats(where_they_are(field, pasted), _include_clone_source(edit, box), voxel)
+    if isinstance(edit, Paste):
+        shown = _crop_splats(field, moved_splats(field, stack), box)
+        after = voxelize_splats(where_they_are(field, shown), _include_clone_source(edit, box), voxel)
     result = compute_patch(
         grid,
         EditStack(),
         edit,
         model,
         include_destination=include_destination,
-        visibility=None if below.active else visibility,
+        visibility=None if below.steps else visibility,
         after=after,
     )
     known, new = KnownSplats.from_moved(field, splats, grid, moved), NO_SPLATS
     is_new = result.under.changed_from(result.emptied, MIN_FILL_DIFFERENCE)
-    if isinstance(edit.fill, Clone) and not edit.keep_source:
+    if isinstance(edit.fill, Clone) and edit.uncovers:
         new = known.clone_cage(result.under, edit.inner, edit.fill.source)
     elif result.support is not None:
         new = known.fill_surface(result.under, is_new, result.context.region, edit.inner, result.support)
@@ -109,11 +110,11 @@ def build_splat_patch(
 
 def relight_splats(
     field: SplatField,
-    below: EditStack,
-    edit: Edit,
+    below: EditMap,
+    edit: Continuous,
     model: LightModel,
     visibility: CameraVisibility | None = None,
-) -> Edit:
+) -> PreparedEdit:
     """Edit that changes the light of splats under a continuous edit (`completion.continuous_relighting`)."""
     field = with_pasted(field, below)
     box = light_box(edit, 0.0, model.max_radius, model.shadow_directions)
@@ -129,7 +130,7 @@ def relight_splats(
     new, is_new = NO_SPLATS, np.zeros(block.shape, bool)
     if edit.fill == "surroundings":
         under, support = inpaint_shaded_support(
-            relit, edit, bent, EditStack(), None if below.active else visibility
+            relit, edit, bent, EditStack(), None if below.steps else visibility
         )
         if support is not None:
             is_new = under.changed_from(relit, MIN_FILL_DIFFERENCE)

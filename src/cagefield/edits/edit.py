@@ -1,41 +1,50 @@
-"""One edit: two cages, the operations that move the inner one, and the kind of adjustment."""
+"""Edit: an inner cage, the operations that move it, and the kind of edit, one class for each kind."""
 
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypedDict, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cagefield.compute.identity_memo import memoized_by_identity
 from cagefield.edits import operations as ops
-from cagefield.edits.edit_names import problem_of_name
+from cagefield.edits.edit_names import problem_of_name, problem_of_source
 from cagefield.edits.operation_sequence import ImpossibleOperationError, cages_along, problem_of_count
 from cagefield.edits.operations import Operation
-from cagefield.edits.options import FEATHER, Adjustment, Fill, Relight, problem_of_options
-from cagefield.edits.paste_paths import problem_of_source
-from cagefield.edits.patch import Pasted, Patch, SplatPatch
-from cagefield.edits.safe_fraction import as_text, flow_reach, largest_safe
+from cagefield.edits.options import FEATHER, Fill, Relight, problem_of_infill, problem_of_lattice
+from cagefield.edits.safe_fraction import as_text, flow_reach, is_valid, largest_safe
+from cagefield.edits.shells import (
+    NO_SHELL,
+    SMOOTH_FLOW,
+    Flow,
+    ShellKind,
+    ShellSettings,
+    problem_of_unused_falloff,
+)
 from cagefield.errors import CageError, DeviceError, EditError
-from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Axes, Cage, outside_by
 from cagefield.geometry.cage_checks import format_vector
-from cagefield.typing import Array
-from cagefield.warps import SHELLS, Falloff, FlowShell, Shell, Warp
+from cagefield.typing import Array, Float32
+from cagefield.warps import FlowShell, Shell, Warp
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.hexahedron_map import HexahedronMap
 from cagefield.warps.lattice import Lattice
 
-AT_ONCE = 500
+CHUNK_POINTS = 500
 """Points at which a lattice is compared with the exact map at a time: hundredths of a second."""
 
-_SEARCHED = 500
-"""Operations among which the one is sought that an impossible edit never recovered from."""
+_MAX_SEARCHED_OPERATIONS = 500
+"""Maximum number of operations searched for the one from which an impossible edit never recovered."""
+
+AnyEdit = TypeVar("AnyEdit", bound="Edit")
 
 
 class ImpossibleEditError(EditError):
@@ -46,95 +55,95 @@ class ImpossibleEditError(EditError):
         self.number = number
 
 
+class SharedOptions(TypedDict):
+    """Fields that edits of every kind have, but for the operations, which a delete has not."""
+
+    name: str
+    enabled: bool
+    fill: Fill
+    relight: Relight
+    feather: float
+
+
 @dataclass(frozen=True)
-class Edit:
-    """An inner cage that moves, and what becomes of the rest. Operations return a new edit.
+class Edit(ABC):
+    """Edit of one cage: abstract, a `Continuous`, `Move`, `Copy`, `Delete` or `Paste`. Operations return a
+    new edit of the same kind.
 
     Parameters
     - inner: the canonical inner cage V^c: where the content is in the trained field.
-    - outer: the outer cage V^o, which confines a continuous edit; ignored by a discrete one.
-    - adjustment: "continuous" (the shell between the cages is interpolated and the field stays connected) or
-      "discrete" (only the inner region changes: moved, with `keep_source` copied, with `deleted` removed).
-    - shell: the continuous map between the cages, a name in `warps.SHELLS`: "flow" cannot fold, "trilinear"
-      is the paper's.
-    - operations: what moved the inner cage, in order; `deformed` is the result.
-    - lattice: None evaluates the shell exactly at every sample; an integer R interpolates it from R^3 nodes
-      (64, 128 or 256 in the paper). The inner region is exact either way.
+    - operations: operations that move the inner cage, in order; `deformed` is the result.
+    - name: name in lists and messages.
     - enabled: False hides the edit in a stack.
-    - falloff: how the motion fades through a flow shell, "smooth" or "linear".
-    - width: how much of the flow shell moves, in (0, 1]: from "only near the inner cage" to the whole shell.
-    - allow_folding: True evaluates a folded shell instead of raising; where it overlaps itself, one of the
-      sheets is shown.
-    - fill: what a move or a delete uncovers: "surroundings" goes on with the surface that it stood on, "none"
-      leaves it as it was trained, a `Clone` copies a cage. Under a continuous edit that takes its light along
-      "surroundings" does so where that grows a lot.
+    - fill: infill of the region that a move or a delete uncovers: "surroundings" continues the surface that
+      the content stood on, "none" leaves the region as trained, a `Clone` copies a cage. Under a continuous
+      edit that relights, "surroundings" fills where the light grows a lot.
     - relight: "occlusion" takes contact shadows along, "shadow" those of a dominant light too, where one is
-      found, a `CastShadow` those of a light that is set by hand; "none" leaves all.
-    - feather: of a discrete edit of voxels, how many voxels along the faces of V blend into what is there.
-    - source: None, or the scene folder or file of splats that a copy is taken from: a *paste*. `inner` is
-      then a cage in that scene's space, which the operations take to where it stands in this one. Relative
-      to the folder of this scene, or absolute. See `Edit.paste`.
-    - patch: of a discrete edit, what the field that it was made for shows where something was taken away
-      (`cagefield.completion`); no part of edit files, as `pasted`, what a paste shows there.
+      found, a `CastShadow` those of a light that is set by hand; "none" leaves all light.
+    - feather: of a discrete edit of voxels, width in voxels of the blend along the faces of V.
 
-    Raises `EditError` for impossible combinations and operations; cages that do not fit together and folded
-    shells are reported by `check`, which every evaluation calls.
+    Every kind keeps `fill`, `relight` and `feather`, for when the kind of the edit is changed.
+
+    Raises `EditError` for invalid options and impossible operations; cages that do not fit together and
+    folded shells are reported by `check`, which every evaluation calls.
     """
 
     inner: Cage
-    outer: Cage | None = None
-    adjustment: Adjustment = "continuous"
-    shell: str = "flow"
-    keep_source: bool = False
-    name: str = ""
+    _: KW_ONLY
     operations: tuple[Operation, ...] = ()
-    lattice: int | None = None
+    name: str = ""
     enabled: bool = True
-    allow_folding: bool = False
-    deleted: bool = False
-    falloff: str = "smooth"
-    width: float = 1.0
     fill: Fill = "surroundings"
     relight: Relight = "occlusion"
     feather: float = FEATHER
-    source: str | None = None
-    patch: Patch | SplatPatch | None = None
-    pasted: Pasted | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "operations", tuple(self.operations))
         problem = problem_of_name(self.name) or problem_of_count(len(self.operations))
         if problem is not None:
             raise EditError(f"edit: {problem}")
-        problem = problem_of_options(
-            self.adjustment,
-            self.shell,
-            has_outer=self.outer is not None,
-            has_operations=bool(self.operations),
-            keep_source=self.keep_source,
-            deleted=self.deleted,
-            fading=(self.falloff, self.width),
-            lattice=self.lattice,
-            surroundings=(self.fill, self.relight, self.feather),
-        ) or problem_of_source(
-            self.source, is_copy=self.adjustment == "discrete" and self.keep_source and not self.deleted
-        )
-        if problem is not None:
-            raise self._error(problem)
+        self._refuse(problem_of_infill(self.fill, self.relight, self.feather))
         self.deformed  # noqa: B018  an operation that makes an impossible cage is an error here
 
-    @classmethod
-    def delete(cls, cage: Cage, *, name: str = "") -> Edit:
-        """The edit that empties a cage."""
-        return cls(cage, adjustment="discrete", deleted=True, name=name)
+    # ---- kinds ----
 
-    @classmethod
-    def paste(cls, source: str | os.PathLike[str], cage: Cage, *, name: str = "") -> Edit:
-        """The edit that copies what a cage holds in another scene: a scene folder, or a file of splats.
+    @staticmethod
+    def continuous(
+        inner: Cage,
+        outer: Cage,
+        *,
+        shell: ShellKind = SMOOTH_FLOW,
+        lattice: int | None = None,
+        name: str = "",
+        **options: Any,
+    ) -> Continuous:
+        """Edit whose surroundings give way between an inner and an outer cage; see `Continuous`."""
+        return Continuous(inner, outer, shell=shell, lattice=lattice, name=name, **options)
 
-        `Scene.paste` makes one of the whole scene, of a size and at a place that suit.
+    @staticmethod
+    def move(cage: Cage, *, name: str = "", **options: Any) -> Move:
+        """Edit that takes the content of a cage away and shows it elsewhere; see `Move`."""
+        return Move(cage, name=name, **options)
+
+    @staticmethod
+    def copy(cage: Cage, *, name: str = "", **options: Any) -> Copy:
+        """Edit that shows the content of a cage a second time; see `Copy`."""
+        return Copy(cage, name=name, **options)
+
+    @staticmethod
+    def delete(cage: Cage, *, name: str = "", **options: Any) -> Delete:
+        """Edit that empties a cage; see `Delete`."""
+        return Delete(cage, name=name, **options)
+
+    @staticmethod
+    def paste(source: str | os.PathLike[str], cage: Cage, *, name: str = "", **options: Any) -> Paste:
+        """Edit that copies the content of a cage of another scene: a scene folder, or a file of splats.
+
+        `Scene.paste` makes one of the whole scene, of a size and at a place that suit. See `Paste`.
         """
-        return cls(cage, adjustment="discrete", keep_source=True, source=os.fspath(source), name=name)
+        return Paste(cage, os.fspath(source), name=name, **options)
+
+    # ---- operations ----
 
     @cached_property
     def deformed(self) -> Cage:
@@ -144,151 +153,244 @@ class Edit:
             for cage in cages_along(self.inner, self.operations):  # noqa: B007
                 pass
         except ImpossibleOperationError as error:
-            raise ImpossibleEditError(str(self._error(str(error))), error.number) from None
+            raise ImpossibleEditError(str(self.error(str(error))), error.number) from None
         return cage
 
-    def translate(self, by: ArrayLike) -> Edit:
+    def translate(self: AnyEdit, by: ArrayLike) -> AnyEdit:
         """The edit with its inner cage moved by a vector [3]."""
         return self.then(ops.Translate(ops.displacement(by, "translate")))
 
-    def rotate(self, theta: ArrayLike, *, axes: Axes = "world") -> Edit:
+    def rotate(self: AnyEdit, theta: ArrayLike, *, axes: Axes = "world") -> AnyEdit:
         """The edit with its inner cage turned about its pivot, intrinsic XYZ angles [3] in radians."""
         return self.then(ops.Rotate.from_rotation(theta, axes))
 
-    def scale(self, by: ArrayLike, *, axes: Axes = "world") -> Edit:
+    def scale(self: AnyEdit, by: ArrayLike, *, axes: Axes = "world") -> AnyEdit:
         """The edit with its inner cage scaled about its pivot by one factor or three."""
         return self.then(ops.Scale.of(by, axes))
 
-    def shear(self, *, axes: Axes = "world", **factors: float) -> Edit:
+    def shear(self: AnyEdit, *, axes: Axes = "world", **factors: float) -> AnyEdit:
         """The edit with its inner cage sheared about its pivot; factors xy, xz, yx, yz, zx, zy."""
         return self.then(ops.Shear(**factors, axes=axes))
 
-    def move_corner(self, corner: int, by: ArrayLike) -> Edit:
+    def move_corner(self: AnyEdit, corner: int, by: ArrayLike) -> AnyEdit:
         """The edit with one corner of its inner cage moved by a vector [3]."""
         return self.then(ops.MoveCorner(corner, ops.displacement(by, "move_corner")))
 
-    def move_edge(self, edge: tuple[int, int], by: ArrayLike) -> Edit:
+    def move_edge(self: AnyEdit, edge: tuple[int, int], by: ArrayLike) -> AnyEdit:
         """The edit with an edge (i, j) of its inner cage moved by a vector [3]."""
         return self.then(ops.MoveEdge((edge[0], edge[1]), ops.displacement(by, "move_edge")))
 
-    def move_face(self, face: str, by: ArrayLike) -> Edit:
+    def move_face(self: AnyEdit, face: str, by: ArrayLike) -> AnyEdit:
         """The edit with a face of its inner cage, such as "+x", moved by a vector [3]."""
         return self.then(ops.MoveFace(face, ops.displacement(by, "move_face")))
 
-    def then(self, operation: Operation) -> Edit:
+    def then(self: AnyEdit, operation: Operation) -> AnyEdit:
         """The edit with one more operation."""
         return self.replace(operations=(*self.operations, operation))
 
-    def replace(self, **changes: Any) -> Edit:
-        """The edit with some fields changed."""
+    def replace(self: AnyEdit, **changes: Any) -> AnyEdit:
+        """The edit with some fields changed; its kind stays."""
         return replace(self, **changes)
 
-    @cached_property
+    @property
+    def shared_options(self) -> SharedOptions:
+        """Fields that an edit of another kind takes over."""
+        return {
+            "name": self.name,
+            "enabled": self.enabled,
+            "fill": self.fill,
+            "relight": self.relight,
+            "feather": self.feather,
+        }
+
+    # ---- kind-specific ----
+
+    @property
+    @abstractmethod
+    def shell_settings(self) -> ShellSettings:
+        """Settings of the shell; of a discrete edit those for a change of its kind, without effect."""
+
+    @abstractmethod
+    def with_shell_settings(self: AnyEdit, settings: ShellSettings) -> AnyEdit:
+        """The edit with other settings of the shell."""
+
+    @property
+    @abstractmethod
     def changes_anything(self) -> bool:
-        """False when the inner cage is where it was (and not deleted or pasted): the map is the identity."""
-        if self.deleted or self.source is not None:
-            return True
-        return not np.array_equal(self.inner.corners, self.deformed.corners)
+        """False where the map is the identity: the inner cage of a move, copy or continuous edit is where it
+        was."""
 
     @property
-    def under(self) -> VoxelField | None:
-        """What its region shows instead of nothing, if that is a layer."""
-        return self.patch.under if isinstance(self.patch, Patch) else None
-
-    @property
-    def part(self) -> VoxelField | None:
-        """What V shows instead of the field, if that is a layer."""
-        if self.pasted is not None:
-            return self.pasted.part
-        return self.patch.part if isinstance(self.patch, Patch) else None
-
-    @property
-    def layers(self) -> tuple[VoxelField, ...]:
-        """`under` and `part`, those of them that there are."""
-        return tuple(layer for layer in (self.under, self.part) if layer is not None)
-
-    @property
+    @abstractmethod
     def boxes(self) -> Array:
         """Deformed-space boxes [B,2,3] (min, max), B 0 to 2, outside which the edit changes nothing."""
-        cages: list[Cage] = []
-        if self.changes_anything:
-            if self.adjustment == "continuous" and self.outer is not None:
-                cages = [self.outer]
-            else:
-                cages = [] if self.deleted else [self.deformed]
-                if self.patch is not None:
-                    cages.append(self.patch.region)
-                elif not self.keep_source:
-                    cages.append(self.inner)
-        return np.array([cage.aabb for cage in cages]).reshape(-1, 2, 3)
+
+    @property
+    @abstractmethod
+    def exact_warp(self) -> Warp:
+        """The map of this edit without its lattice. Raises `EditError` as `check` does."""
+
+    @property
+    @abstractmethod
+    def warp(self) -> Warp:
+        """The map of this edit, through its lattice if it has one. Raises `EditError` as `check` does."""
+
+    @abstractmethod
+    def check(self) -> None:
+        """Raise `EditError` where the edit cannot be evaluated, naming the fault and the share still safe."""
+
+    @property
+    @abstractmethod
+    def is_possible(self) -> bool:
+        """True where the edit can be evaluated: where `check` raises nothing. Faster than its message."""
+
+    @abstractmethod
+    def without_lattice(self: AnyEdit) -> AnyEdit:
+        """The edit evaluated exactly; a discrete edit as it is."""
+
+    @abstractmethod
+    def largest_share(self, operation: Operation, cage: Cage) -> float:
+        """Largest safe share in [0,1] of an operation on the inner cage when that is at `cage`."""
+
+    # ---- shared ----
 
     @property
     def bounds(self) -> Array:
         """The box [2,3] that holds `boxes`; (inf, -inf) for an edit that changes nothing."""
         return bounds_of(self.boxes)
 
-    @cached_property
-    def exact_warp(self) -> Warp:
-        """The map of this edit without its lattice. Raises `EditError` as `check` does."""
-        self.check()
-        place = None if self.pasted is None else self.pasted.place
-        inner = HexahedronMap(place or self.inner, self.deformed)
-        if self.adjustment == "discrete" or self.outer is None:
-            region = None if self.patch is None else self.patch.read_instead
-            foreign = self.source is not None
-            return DiscreteWarp(
-                self.inner, None if self.deleted else inner, self.keep_source, region, foreign
-            )
-        return ContinuousWarp(inner, self.outer, self._last_shell)
+    def safe_fraction(self, operation: Operation | None = None) -> float:
+        """Largest t in [0,1], to 1e-3, at which the share t of an operation can follow this edit.
+
+        1.0 where the whole operation is safe; otherwise everything from 0 to t is. The default is the last
+        operation. A discrete edit is limited only by its cage turning inside out.
+        """
+        if operation is not None:
+            return self.largest_share(operation, self.deformed)
+        if not self.operations:
+            return 1.0
+        *_, before, _ = (self.inner, *cages_along(self.inner, self.operations))
+        return self.largest_share(self.operations[-1], before)
+
+    def error(self, message: str) -> EditError:
+        """An error that names the edit."""
+        return EditError(f'edit "{self.name}": {message}' if self.name else f"edit: {message}")
+
+    def _refuse(self, problem: str | None) -> None:
+        if problem is not None:
+            raise self.error(problem)
 
     @cached_property
-    def warp(self) -> Warp:
+    def _is_moved(self) -> bool:
+        return not np.array_equal(self.inner.corners, self.deformed.corners)
+
+
+@dataclass(frozen=True)
+class Continuous(Edit):
+    """Edit whose shell, between the inner and the outer cage, is interpolated: the field stays connected.
+
+    Parameters, besides those of `Edit`
+    - outer: the outer cage V^o, which confines the edit.
+    - shell: kind of the map between the cages, `Flow` (cannot fold) or `Trilinear` (the paper's).
+    - lattice: None evaluates the shell exactly at every sample; an integer R interpolates it from R^3 nodes
+      (64, 128 or 256 in the paper). The inner region is exact either way.
+    - allow_folding: True evaluates a folded shell instead of raising; where it overlaps itself, one of the
+      sheets is shown.
+    """
+
+    outer: Cage
+    _: KW_ONLY
+    shell: ShellKind = SMOOTH_FLOW
+    lattice: int | None = None
+    allow_folding: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.outer, Cage):
+            self._refuse(
+                "a continuous edit needs an outer cage; give one (inner.grown(margin), say) or use"
+                ' adjustment="discrete"'
+            )
+        if not isinstance(self.shell, ShellKind):
+            self._refuse(f"shell must be Flow(...) or Trilinear(), got {self.shell!r:.60}")
+        self._refuse(problem_of_lattice(self.lattice))
+        super().__post_init__()
+
+    @property
+    def shell_settings(self) -> ShellSettings:
+        return ShellSettings(self.outer, self.shell, self.lattice, self.allow_folding)
+
+    def with_shell_settings(self, settings: ShellSettings) -> Continuous:
+        return self.replace(
+            outer=settings.outer,
+            shell=settings.shell,
+            lattice=settings.lattice,
+            allow_folding=settings.allow_folding,
+        )
+
+    @property
+    def changes_anything(self) -> bool:
+        return self._is_moved
+
+    @property
+    def boxes(self) -> Array:
+        return _aabbs([self.outer] if self.changes_anything else [])
+
+    @cached_property
+    def exact_warp(self) -> ContinuousWarp:
+        self.check()
+        return ContinuousWarp(HexahedronMap(self.inner, self.deformed), self.outer, self._last_shell)
+
+    @cached_property
+    def warp(self) -> ContinuousWarp:
         """The map of this edit, through its lattice if it has one. Raises `EditError` as `check` does.
 
         The lattice of a flow shell is the kernel's, in float32, where a device starts: in float64 it takes
         minutes.
         """
         exact = self.exact_warp
-        if self.lattice is None or not isinstance(exact, ContinuousWarp):
+        if self.lattice is None:
             return exact
         if isinstance(exact.shell, FlowShell):
-            from cagefield.edits.device.edit_lattice import lattice_of
-
             with suppress(DeviceError):
-                return replace(exact, lattice=lattice_of(self))
+                return replace(exact, lattice=self._kernel_lattice)
         lattice = Lattice.sample(lambda p: exact.to_canonical(p).points, exact.outer, self.lattice)
         return replace(exact, lattice=lattice)
 
-    def check(self) -> None:
-        """Raise `EditError` where the edit cannot be evaluated, naming what is wrong and what is still safe.
+    @property
+    def lattice_nodes(self) -> Float32:
+        """The nodes [R^3,3] of the lattice, displacements in world units, x fastest, sampled by the kernel.
 
-        A continuous edit's inner cage must lie in its outer cage, before and after the operations, and its
-        shell must not fold (unless `allow_folding`).
+        Kept while this edit, or an equal one, lives. Raises `DeviceError` where no device starts, `EditError`
+        without a lattice, without enough free memory, and as `check` does.
+        """
+        return _lattice_nodes(self)
+
+    @property
+    def _kernel_lattice(self) -> Lattice:
+        """The lattice as the renderer has it, for the float64 reference. Raises as `lattice_nodes` does."""
+        origin, frame = self.outer.frame
+        grid = self.lattice_nodes.reshape(*3 * (self.lattice or 0,), 3)
+        return Lattice(origin, frame, grid.astype(np.float64))
+
+    def check(self) -> None:
+        """Raise `EditError` where the edit cannot be evaluated, naming the fault and the share still safe.
+
+        The inner cage must lie in the outer cage, before and after the operations, and the shell must not
+        fold (unless `allow_folding`).
         """
         if not self._is_safe(self.inner):
-            message, cure = self._problem(self.inner)
-            raise self._error(message + cure)
+            message, cure = self._fault(self.inner)
+            raise self.error(message + cure)
         if not self._is_safe(self.deformed):
-            message, cure = self._problem(self.deformed)
-            raise self._error(message + self._safe_part() + cure)
+            message, cure = self._fault(self.deformed)
+            raise self.error(message + self._safe_part() + cure)
 
     @property
     def is_possible(self) -> bool:
-        """True where the edit can be evaluated: where `check` raises nothing. Sooner than its message."""
         return self._is_safe(self.inner) and self._is_safe(self.deformed)
 
-    def safe_fraction(self, operation: Operation | None = None) -> float:
-        """Largest t in [0,1], to 1e-3, at which the share t of an operation can follow this edit.
-
-        1.0 where the whole operation is safe; otherwise everything from 0 to t is. The last operation is
-        meant where none is given. A discrete edit is limited only by its cage turning inside out.
-        """
-        if operation is not None:
-            return self._largest_part(operation, self.deformed)
-        if not self.operations:
-            return 1.0
-        *_, before, _ = (self.inner, *cages_along(self.inner, self.operations))
-        return self._largest_part(self.operations[-1], before)
+    def without_lattice(self) -> Continuous:
+        return self.replace(lattice=None)
 
     def lattice_error(
         self,
@@ -304,108 +406,219 @@ class Edit:
         `proceed` is called now and then, and gives the measurement up by raising.
         """
         warp, nodes = self.exact_warp, resolution if resolution is not None else self.lattice
-        if nodes is None or not isinstance(warp, ContinuousWarp):
+        if nodes is None:
             return 0.0, 0.0
         # The kernel's, which takes no time: float32's rounding is far below the lattice's error.
-        from cagefield.edits.device.edit_lattice import lattice_of
-
-        lattice = lattice_of(self.replace(lattice=nodes))
+        lattice = self.replace(lattice=nodes)._kernel_lattice
         points, distances = warp.shell_points(samples), [np.zeros(0)]
-        for first in range(0, len(points), AT_ONCE):
+        for first in range(0, len(points), CHUNK_POINTS):
             if proceed is not None:
                 proceed()
-            part = points[first : first + AT_ONCE]
-            difference = lattice.to_canonical(part)[0] - warp.to_canonical(part).points
+            chunk = points[first : first + CHUNK_POINTS]
+            difference = lattice.to_canonical(chunk)[0] - warp.to_canonical(chunk).points
             distances.append(np.linalg.norm(difference, axis=1))
         distance = np.concatenate(distances)
         return float(distance.max(initial=0.0)), float(distance.mean()) if len(distance) else 0.0
 
-    def _largest_part(self, operation: Operation, cage: Cage) -> float:
-        """Largest share of an operation on the inner cage, when that is at `cage`, that is safe."""
-
-        def safe(t: float) -> bool:
+    def largest_share(self, operation: Operation, cage: Cage) -> float:
+        def is_safe(t: float) -> bool:
             try:
                 return self._is_safe(operation.part(t).apply(cage))
             except CageError:
                 return False
 
-        if self.adjustment == "continuous" and self.shell == "flow" and self.outer is not None:
-            if safe(1.0):
+        if isinstance(self.shell, Flow):
+            if is_safe(1.0):
                 return 1.0
             for fine in (False, True):
                 reach = flow_reach(operation, cage, (self.inner, self.outer), fine=fine)
-                if reach < 1.0 and safe(reach):
+                if reach < 1.0 and is_safe(reach):
                     return reach
-        return largest_safe(safe)
+        return largest_safe(is_safe)
 
     def _safe_part(self) -> str:
-        """What is still safe of the operation after which the edit never recovered, as a clause."""
+        """Clause with the safe share of the operation after which the edit never recovered."""
         cages = [self.inner, *cages_along(self.inner, self.operations)]
         # Of very many operations only the last are searched, which take a second.
-        for number in range(len(self.operations), max(0, len(self.operations) - _SEARCHED), -1):
+        first = max(0, len(self.operations) - _MAX_SEARCHED_OPERATIONS)
+        for number in range(len(self.operations), first, -1):
             if self._is_safe(cages[number - 1]):
                 operation = self.operations[number - 1]
-                share = as_text(self._largest_part(operation, cages[number - 1]))
+                share = as_text(self.largest_share(operation, cages[number - 1]))
                 return f"; {share} of this {operation.noun} (operation {number}, {operation}) is safe"
         return ""
 
     def _is_safe(self, deformed: Cage) -> bool:
         """True where the edit can be evaluated with its inner cage at `deformed`."""
-        if self.adjustment == "discrete" or self.outer is None:
-            return True
-        if self.shell == "flow":  # which finds corners outside by itself
+        if isinstance(self.shell, Flow):  # which finds corners outside by itself
             return self._shell(deformed).problem() is None
         if not self.outer.contains(deformed.corners).all():
             return False
         return self.allow_folding or self._shell(deformed).problem() is None
 
-    def _problem(self, deformed: Cage) -> tuple[str, str]:
-        """(what is wrong, the cure) with the inner cage at a `deformed` that is not safe."""
-        if self.outer is not None:
-            outside = np.flatnonzero(~self.outer.contains(deformed.corners))
-            if len(outside):
-                face, distance, k = max(
-                    ((*outside_by(self.outer, deformed.corners[k]), int(k)) for k in outside),
-                    key=lambda item: item[1],
-                )
-                return (
-                    f"outer cage must contain the inner cage: inner corner {k} at"
-                    f" {format_vector(deformed.corners[k])} is {distance:.3g} outside face {face}",
-                    '; enlarge the outer cage or use adjustment="discrete"',
-                )
+    def _fault(self, deformed: Cage) -> tuple[str, str]:
+        """(fault, cure) with the inner cage at a `deformed` that is not safe."""
+        outside = np.flatnonzero(~self.outer.contains(deformed.corners))
+        if len(outside):
+            face, distance, k = max(
+                ((*outside_by(self.outer, deformed.corners[k]), int(k)) for k in outside),
+                key=lambda item: item[1],
+            )
+            return (
+                f"outer cage must contain the inner cage: inner corner {k} at"
+                f" {format_vector(deformed.corners[k])} is {distance:.3g} outside face {face}",
+                '; enlarge the outer cage or use adjustment="discrete"',
+            )
         cure = '; reduce it, enlarge the outer cage, or use adjustment="discrete"'
         return (
-            f"the {self.shell} shell {self._shell(deformed).problem()}",
+            f"the {self.shell.name} shell {self._shell(deformed).problem()}",
             "" if deformed is self.inner else cure,
         )
 
     def _shell(self, deformed: Cage) -> Shell:
-        if self.outer is None:
-            raise self._error("a shell needs an outer cage")
         if deformed is self.deformed:
             return self._last_shell
-        return SHELLS[self.shell](self.inner, deformed, self.outer, Falloff(self.falloff, self.width))
+        return self.shell.build(self.inner, deformed, self.outer)
 
     @cached_property
     def _last_shell(self) -> Shell:
         """The shell with all operations done."""
-        if self.outer is None:
-            raise self._error("a shell needs an outer cage")
-        falloff = Falloff(self.falloff, self.width)
-        return SHELLS[self.shell](self.inner, self.deformed, self.outer, falloff)
+        return self.shell.build(self.inner, self.deformed, self.outer)
+
+
+@memoized_by_identity
+def _lattice_nodes(edit: Continuous) -> Float32:
+    from cagefield.edits.device.edit_lattice import sample_nodes
+
+    if edit.lattice is None:
+        raise edit.error("only a continuous edit with a lattice has nodes")
+    return sample_nodes(edit.exact_warp, edit.lattice)
+
+
+@dataclass(frozen=True)
+class Discrete(Edit, ABC):
+    """Edit that changes its inner region only: abstract, a `Move`, `Copy`, `Delete` or `Paste`.
+
+    `unused_shell` has no effect, see `ShellSettings`.
+    """
+
+    _: KW_ONLY
+    unused_shell: ShellSettings = NO_SHELL
+
+    def __post_init__(self) -> None:
+        self._refuse(problem_of_lattice(self.unused_shell.lattice))
+        if isinstance(self.unused_shell.shell, Flow):
+            self._refuse(problem_of_unused_falloff(self.unused_shell.shell, "discrete edit"))
+        super().__post_init__()
+
+    @property
+    def shell_settings(self) -> ShellSettings:
+        return self.unused_shell
+
+    def with_shell_settings(self: AnyDiscrete, settings: ShellSettings) -> AnyDiscrete:
+        return self.replace(unused_shell=settings)
+
+    @property
+    def uncovers(self) -> bool:
+        """True where the content of V^c is taken away: of a move and a delete."""
+        return isinstance(self, Move | Delete)
+
+    @property
+    def boxes(self) -> Array:
+        if not self.changes_anything:
+            return _aabbs([])
+        shown = [] if isinstance(self, Delete) else [self.deformed]
+        return _aabbs([*shown, self.inner] if self.uncovers else shown)
+
+    @cached_property
+    def exact_warp(self) -> DiscreteWarp:
+        inner = None if isinstance(self, Delete) else HexahedronMap(self.inner, self.deformed)
+        return DiscreteWarp(self.inner, inner, not self.uncovers, pasted=isinstance(self, Paste))
+
+    @property
+    def warp(self) -> DiscreteWarp:
+        return self.exact_warp
+
+    def check(self) -> None:
+        """Nothing: every discrete edit that can be constructed can be evaluated."""
+
+    @property
+    def is_possible(self) -> bool:
+        return True
+
+    def without_lattice(self: AnyDiscrete) -> AnyDiscrete:
+        return self
+
+    def largest_share(self, operation: Operation, cage: Cage) -> float:
+        return largest_safe(lambda t: is_valid(operation, t, cage))
+
+
+AnyDiscrete = TypeVar("AnyDiscrete", bound=Discrete)
+
+
+@dataclass(frozen=True)
+class Move(Discrete):
+    """Edit that shows the content of V^c in V; the rest of V^c is emptied, and filled by `fill`."""
+
+    @property
+    def changes_anything(self) -> bool:
+        return self._is_moved
+
+
+@dataclass(frozen=True)
+class Copy(Discrete):
+    """Edit that shows the content of V^c in V too; V^c stays."""
+
+    @property
+    def changes_anything(self) -> bool:
+        return self._is_moved
+
+
+@dataclass(frozen=True)
+class Delete(Discrete):
+    """Edit that empties V^c, which `fill` fills. A delete has no operations."""
+
+    def __post_init__(self) -> None:
+        if self.operations:
+            self._refuse("a delete has no operations and keeps no source")
+        super().__post_init__()
+
+    @property
+    def changes_anything(self) -> bool:
+        return True
+
+
+@dataclass(frozen=True)
+class Paste(Discrete):
+    """Edit that shows the content of a cage of another scene in V.
+
+    - inner: cage in the space of the other scene, which the operations take to its place in this one.
+    - source: path of the scene folder or file of splats, relative to the folder of this scene, or absolute.
+    """
+
+    source: str
+
+    def __post_init__(self) -> None:
+        self._refuse(problem_of_source(self.source))
+        super().__post_init__()
+
+    @property
+    def changes_anything(self) -> bool:
+        return True
 
     def unread(self) -> EditError:
-        """The error of a paste without what it pastes."""
+        """Error of a paste whose source has not been read."""
         return self.cannot_paste("nobody has read it; render the edit as part of a Scene")
 
-    def cannot_paste(self, why: str) -> EditError:
-        """The error of a paste that cannot be shown."""
-        return self._error(f"pastes from {self.source}: {why}")
-
-    def _error(self, message: str) -> EditError:
-        return EditError(f'edit "{self.name}": {message}' if self.name else f"edit: {message}")
+    def cannot_paste(self, reason: str) -> EditError:
+        """Error of a paste that cannot be shown."""
+        return self.error(f"pastes from {self.source}: {reason}")
 
 
 def bounds_of(boxes: Array) -> Array:
     """The box [2,3] that holds boxes [B,2,3]; (inf, -inf) for none."""
     return np.stack([boxes[:, 0].min(axis=0, initial=np.inf), boxes[:, 1].max(axis=0, initial=-np.inf)])
+
+
+def _aabbs(cages: list[Cage]) -> Array:
+    return np.array([cage.aabb for cage in cages]).reshape(-1, 2, 3)

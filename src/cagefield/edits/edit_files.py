@@ -39,6 +39,8 @@ from __future__ import annotations
 import json
 import os
 import warnings
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -46,14 +48,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cagefield.edits import file_nodes, operations
-from cagefield.edits.edit import Edit, ImpossibleEditError
+from cagefield.edits.edit import Continuous, Copy, Delete, Edit, ImpossibleEditError, Move, Paste
 from cagefield.edits.edit_names import mended, problem_of_name
 from cagefield.edits.file_nodes import Node
 from cagefield.edits.operation_sequence import problem_of_count
 from cagefield.edits.operations import Operation, euler_degrees
 from cagefield.edits.options import FEATHER, CastShadow, Clone, problem_of_lattices
+from cagefield.edits.shells import Flow, ShellKind, ShellSettings, problem_of_unused_falloff, shell_kind
 from cagefield.edits.stack import EditStack
-from cagefield.errors import CagefieldError, EditFileError
+from cagefield.errors import CagefieldError, EditError, EditFileError
 from cagefield.files.atomic import replaced_file
 from cagefield.files.safe_open import read_text
 from cagefield.geometry.cage import Cage
@@ -109,13 +112,20 @@ def _stack(node: Node, check: bool, mend: bool) -> EditStack:
     if len(items) > MOST_EDITS:
         raise node.error(f"{len(items)} edits are too many, a file has at most {MOST_EDITS}; leave some out")
     edits = [_edit(item, check, mend) for item in items]
-    shown = [edit for edit in edits if edit.enabled and edit.adjustment == "continuous"]
-    if (problem := problem_of_lattices(edit.lattice for edit in shown)) is not None:
+    shown = (edit.lattice for edit in edits if edit.enabled and isinstance(edit, Continuous))
+    if (problem := problem_of_lattices(shown)) is not None:
         if not mend:
             raise node.error(problem)
         warnings.warn(f"{node.error(problem)}; lattices above 64 are made 64", stacklevel=2)
-        edits = [edit.replace(lattice=min(edit.lattice, 64)) if edit.lattice else edit for edit in edits]
+        edits = [_with_small_lattice(edit) for edit in edits]
     return EditStack(edits)
+
+
+def _with_small_lattice(edit: Edit) -> Edit:
+    settings = edit.shell_settings
+    if not settings.lattice:
+        return edit
+    return edit.with_shell_settings(replace(settings, lattice=min(settings.lattice, 64)))
 
 
 def save_edits(stack: EditStack, path: str | os.PathLike[str]) -> None:
@@ -162,41 +172,28 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
         ),
     )
     inner = _cage(keys["inner"])
-    deleted = keys["delete"].boolean() if "delete" in keys else False
-    options: dict[str, Any] = {"deleted": deleted}
-    if "outer" in keys and not keys["outer"].is_null:
-        options["outer"] = _outer(keys["outer"], inner)
-    pasted = "source" in keys and not keys["source"].is_null
-    options["adjustment"] = "discrete" if deleted or pasted else "continuous"
-    if pasted:
-        options["source"], options["keep_source"] = keys["source"].text(), not deleted
-    if "adjustment" in keys:
-        options["adjustment"] = keys["adjustment"].choice(("continuous", "discrete"))
+    outer = None if "outer" not in keys or keys["outer"].is_null else _outer(keys["outer"], inner)
+    options: dict[str, Any] = {}
     if "fill" in keys:
         options["fill"] = _fill(keys["fill"])
     if "relight" in keys:
         options["relight"] = _relight(keys["relight"])
-    for name in ("shell", "falloff"):
-        if name in keys:
-            options[name] = keys[name].text()
     if "name" in keys:
         options["name"] = _name(keys["name"], mend)
-    for name in ("keep_source", "enabled", "allow_folding"):
-        if name in keys:
-            options[name] = keys[name].boolean()
-    for name in ("width", "feather"):
-        if name in keys:
-            options[name] = keys[name].number()
-    if "lattice" in keys and not keys["lattice"].is_null:
-        options["lattice"] = keys["lattice"].integer(2, 512)
+    if "enabled" in keys:
+        options["enabled"] = keys["enabled"].boolean()
+    if "feather" in keys:
+        options["feather"] = keys["feather"].number()
     items = keys["operations"].items() if "operations" in keys else []
     if (problem := problem_of_count(len(items))) is not None:
         raise keys["operations"].error(problem)
     options["operations"] = tuple(_operation(item) for item in items)
     try:
-        edit = Edit(inner, **options)
+        edit = _of_kind(keys, inner, outer, options)
     except ImpossibleEditError as error:
         raise items[error.number - 1].error(str(error)) from None
+    except EditFileError:
+        raise
     except CagefieldError as error:
         raise node.error(str(error)) from None
     if check and edit.enabled:
@@ -205,6 +202,72 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
         except CagefieldError as error:
             raise node.error(str(error)) from None
     return edit
+
+
+def _of_kind(keys: dict[str, Node], inner: Cage, outer: Cage | None, options: dict[str, Any]) -> Edit:
+    """The edit of the kind that the keys "adjustment", "keep_source", "delete" and "source" name together.
+
+    Raises `EditError` for keys that do not go together.
+    """
+    delete = "delete" in keys and keys["delete"].boolean()
+    source = None if "source" not in keys or keys["source"].is_null else keys["source"].text()
+    keep_source = (
+        keys["keep_source"].boolean() if "keep_source" in keys else source is not None and not delete
+    )
+    adjustment = "discrete" if delete or source is not None else "continuous"
+    if "adjustment" in keys:
+        adjustment = keys["adjustment"].choice(("continuous", "discrete"))
+    shell = keys["shell"].text() if "shell" in keys else "flow"
+    falloff = {name: read(keys[name]) for name, read in _FALLOFF_READERS.items() if name in keys}
+    lattice = None
+    if "lattice" in keys and not keys["lattice"].is_null:
+        lattice = keys["lattice"].integer(2, 512)
+    allow_folding = "allow_folding" in keys and keys["allow_folding"].boolean()
+    name = options.get("name", "")
+    try:
+        if adjustment == "continuous":
+            if keep_source or delete:
+                raise EditError(f'{"deleted" if delete else "keep_source"} needs adjustment="discrete"')
+            kind = _shell_kind(shell, falloff, f"{shell} shell")
+        else:
+            kind = _shell_kind(shell, falloff, "discrete edit", has_falloff=False)
+        if delete and (options["operations"] or keep_source):
+            raise EditError("a delete has no operations and keeps no source")
+        if source is not None and (adjustment == "continuous" or delete or not keep_source):
+            raise EditError(
+                "source is for copies: a paste is discrete and keeps its source; leave out adjustment,"
+                " keep_source and delete, or use Edit.paste"
+            )
+    except EditError as error:
+        raise EditError(f'edit "{name}": {error}' if name else f"edit: {error}") from None
+    if adjustment == "continuous":
+        # Without an outer cage the edit says so.
+        return Continuous(
+            inner,
+            outer,  # type: ignore[arg-type]
+            shell=kind,
+            lattice=lattice,
+            allow_folding=allow_folding,
+            **options,
+        )
+    options["unused_shell"] = ShellSettings(outer, kind, lattice, allow_folding)
+    if source is not None:
+        return Paste(inner, source, **options)
+    return (Delete if delete else Copy if keep_source else Move)(inner, **options)
+
+
+_FALLOFF_READERS: dict[str, Callable[[Node], Any]] = {"falloff": Node.text, "width": Node.number}
+
+
+def _shell_kind(name: str, falloff: dict[str, Any], owner: str, *, has_falloff: bool = True) -> ShellKind:
+    """The shell kind of a name with its falloff and width, which an `owner` without a flow shell has not."""
+    kind, flow = shell_kind(name), Flow(**falloff)
+    if has_falloff and isinstance(kind, Flow):
+        return flow
+    problem = problem_of_unused_falloff(flow, owner)
+    if problem is not None:
+        raise EditError(problem)
+    return kind
 
 
 def _relight(node: Node) -> Any:
@@ -308,24 +371,26 @@ def _operation(node: Node) -> Operation:
 
 def _from_edit(edit: Edit) -> dict[str, Any]:
     content: dict[str, Any] = {"name": edit.name} if edit.name else {}
-    if edit.deleted:
+    settings = edit.shell_settings
+    if isinstance(edit, Delete):
         content["delete"] = True
-    if edit.source is not None:
+    if isinstance(edit, Paste):
         content["source"] = edit.source
     content["inner"] = _from_cage(edit.inner)
-    if edit.outer is not None:
-        content["outer"] = _margin(edit.inner, edit.outer) or _from_cage(edit.outer)
+    if settings.outer is not None:
+        content["outer"] = _margin(edit.inner, settings.outer) or _from_cage(settings.outer)
     if edit.operations:
         content["operations"] = [_from_operation(operation) for operation in edit.operations]
-    if not edit.deleted and edit.source is None:
-        content["adjustment"] = edit.adjustment
-    if edit.adjustment == "continuous" or edit.shell != "flow":
-        content["shell"] = edit.shell
-    if edit.falloff != "smooth":
-        content["falloff"] = edit.falloff
-    if edit.width != 1.0:
-        content["width"] = edit.width
-    if edit.keep_source and edit.source is None:
+    if not isinstance(edit, Delete | Paste):
+        content["adjustment"] = "continuous" if isinstance(edit, Continuous) else "discrete"
+    if isinstance(edit, Continuous) or not isinstance(settings.shell, Flow):
+        content["shell"] = settings.shell.name
+    if isinstance(settings.shell, Flow):
+        if settings.shell.falloff != "smooth":
+            content["falloff"] = settings.shell.falloff
+        if settings.shell.width != 1.0:
+            content["width"] = settings.shell.width
+    if isinstance(edit, Copy):
         content["keep_source"] = True
     if isinstance(edit.fill, Clone):
         content["fill"] = {"clone": _from_cage(edit.fill.source)}
@@ -337,11 +402,11 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
         content["relight"] = edit.relight
     if edit.feather != FEATHER:
         content["feather"] = edit.feather
-    if edit.lattice is not None:
-        content["lattice"] = edit.lattice
+    if settings.lattice is not None:
+        content["lattice"] = settings.lattice
     if not edit.enabled:
         content["enabled"] = False
-    if edit.allow_folding:
+    if settings.allow_folding:
         content["allow_folding"] = True
     return content
 

@@ -8,6 +8,9 @@ import unicodedata
 MOST_CHARACTERS = 200
 """Length of a name; as the editor's page has it."""
 
+MAX_PATH_CHARACTERS = 4096
+"""Length of a path; as Linux has it."""
+
 _UNSAFE = ("Cc", "Cs")
 """Unicode's categories of what no name holds: control characters, and surrogates, which no UTF-8 has."""
 
@@ -21,6 +24,18 @@ def problem_of_name(name: object) -> str | None:
         return f"the name {problem}"
     if len(name) > MOST_CHARACTERS:
         return f"the name has {len(name)} characters, a name has at most {MOST_CHARACTERS}; shorten it"
+    return None
+
+
+def problem_of_source(source: object) -> str | None:
+    """Error text, with the cure, for a paste's source that is no path; None for a path."""
+    if not isinstance(source, str) or not source.strip():
+        return f"source must be the path of a scene folder or a file of splats, got {source!r:.60}"
+    if len(source) > MAX_PATH_CHARACTERS:
+        return f"source has {len(source)} characters, a path has at most {MAX_PATH_CHARACTERS}"
+    problem = problem_of_text(source)
+    if problem is not None:
+        return f"source {problem}"
     return None
 
 

@@ -1,4 +1,4 @@
-"""What the options of an edit may be, and which of them go together."""
+"""Options of edits: fill, light, feather and lattice, with their ranges."""
 
 from __future__ import annotations
 
@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from cagefield.geometry.cage import Cage
-from cagefield.warps import FALLOFFS, SHELLS
-
-Adjustment: TypeAlias = Literal["continuous", "discrete"]
 
 
 @dataclass(frozen=True)
@@ -57,68 +54,25 @@ def problem_of_lattices(lattices: Iterable[int | None]) -> str | None:
     )
 
 
-def problem_of_options(
-    adjustment: str,
-    shell: str,
-    *,
-    has_outer: bool,
-    has_operations: bool,
-    keep_source: bool,
-    deleted: bool,
-    fading: tuple[str, float],
-    lattice: int | None,
-    surroundings: tuple[str | Clone, str | CastShadow, float],
-) -> str | None:
-    """What is wrong with an edit's options, and the cure; None where they go together.
-
-    `fading` is (falloff, width), `surroundings` (fill, relight, feather). See
-    `cagefield.edits.edit.Edit` for what each of them means.
-    """
-    if adjustment not in ("continuous", "discrete"):
-        return f'adjustment must be "continuous" or "discrete", got "{adjustment!s:.40}"'
-    if shell not in SHELLS:
-        return f'shell must be one of {", ".join(SHELLS)}, got "{shell!s:.40}"'
-    for name, value, known in zip(("fill", "relight"), surroundings[:2], (FILLS, RELIGHTS), strict=True):
-        if value not in known and not isinstance(value, Clone if name == "fill" else CastShadow):
+def problem_of_infill(fill: object, relight: object, feather: float) -> str | None:
+    """Error text, with the cure, for an invalid `fill`, `relight` or `feather`; None for valid ones."""
+    for name, value, known, by_hand in (
+        ("fill", fill, FILLS, Clone),
+        ("relight", relight, RELIGHTS, CastShadow),
+    ):
+        if not isinstance(value, by_hand) and value not in known:
             return f'{name} must be one of {", ".join(known)}, got "{value!s:.40}"'
-    if isinstance(surroundings[1], CastShadow):
-        size = sum(value * value for value in surroundings[1].direction)
-        if not (len(surroundings[1].direction) == 3 and 0.0 < size < float("inf")):
-            return (
-                f"the direction to a light must be three numbers, not all 0, got {surroundings[1].direction}"
-            )
-    if not 0.0 <= surroundings[2] <= MOST_FEATHER:
-        return f"feather must be 0 (a hard edge) to {MOST_FEATHER:g} voxels, got {surroundings[2]!r}"
-    if adjustment == "continuous":
-        if not has_outer:
-            return (
-                "a continuous edit needs an outer cage; give one (inner.grown(margin), say) or use"
-                ' adjustment="discrete"'
-            )
-        if keep_source or deleted:
-            return f'{"deleted" if deleted else "keep_source"} needs adjustment="discrete"'
-    if deleted and (has_operations or keep_source):
-        return "a delete has no operations and keeps no source"
-    return _problem_of_falloff(adjustment, shell, *fading) or _problem_of_lattice(lattice)
-
-
-def _problem_of_falloff(adjustment: str, shell: str, falloff: str, width: float) -> str | None:
-    if falloff not in FALLOFFS:
-        return f'falloff must be one of {", ".join(FALLOFFS)}, got "{falloff!s:.40}"'
-    if not 0.0 < width <= 1.0:
-        return f"width must be above 0 and at most 1 (the whole shell), got {width!r}"
-    fades = adjustment == "continuous" and shell == "flow"
-    for name, value, default in (("falloff", falloff, "smooth"), ("width", width, 1.0)):
-        if value != default and not fades:
-            other = "discrete edit" if adjustment == "discrete" else f"{shell} shell"
-            return (
-                f'{name} is an option of the flow shell, and a {other} has none; set shell="flow" (and'
-                f' adjustment="continuous") or leave {name} out'
-            )
+    if isinstance(relight, CastShadow):
+        size = sum(value * value for value in relight.direction)
+        if not (len(relight.direction) == 3 and 0.0 < size < float("inf")):
+            return f"the direction to a light must be three numbers, not all 0, got {relight.direction}"
+    if not 0.0 <= feather <= MOST_FEATHER:
+        return f"feather must be 0 (a hard edge) to {MOST_FEATHER:g} voxels, got {feather!r}"
     return None
 
 
-def _problem_of_lattice(lattice: int | None) -> str | None:
+def problem_of_lattice(lattice: int | None) -> str | None:
+    """Error text, with the cure, for an invalid lattice resolution; None for a valid one."""
     low, high = LATTICE_RANGE
     if lattice is None or (
         isinstance(lattice, int) and not isinstance(lattice, bool) and low <= lattice <= high

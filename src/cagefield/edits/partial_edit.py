@@ -1,20 +1,20 @@
-"""An edit on its way: gone through to a part of what it does, as camera paths show it."""
+"""Edit at a share of its operations, as camera paths show it on the way."""
 
 from __future__ import annotations
 
-from cagefield.edits.edit import Edit
+from cagefield.edits.edit import Delete, Edit, Paste
 
-WHOLE_FROM = 0.5
-"""The part from which on a deletion or a paste is there: there is no half of it."""
+MIN_SHOWN_SHARE = 0.5
+"""Share from which a delete or a paste is shown: neither has an intermediate state."""
 
 
-def partial_edit(edit: Edit, part: float) -> Edit | None:
-    """The edit, each of its operations gone through to a part in [0,1]; None where it shows nothing there.
+def partial_edit(edit: Edit, share: float) -> Edit | None:
+    """The edit with each of its operations done to a share in [0,1]; None where it shows nothing there.
 
-    Raises `EditError` where an operation leads, at that part, to an impossible cage.
+    Raises `EditError` where an operation leads, at that share, to an impossible cage.
     """
-    if edit.deleted or edit.source is not None:
-        return edit if part >= WHOLE_FROM else None
-    if part >= 1.0:
+    if isinstance(edit, Delete | Paste):
+        return edit if share >= MIN_SHOWN_SHARE else None
+    if share >= 1.0:
         return edit
-    return edit.replace(operations=tuple(operation.part(part) for operation in edit.operations))
+    return edit.replace(operations=tuple(operation.part(share) for operation in edit.operations))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from cagefield.edits.edit import Edit
+from cagefield.edits.edit import Edit, Paste
 from cagefield.edits.operations import Rotate, Scale, Translate, euler_degrees
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
@@ -29,7 +29,7 @@ def placed_paste(
     source_up: ArrayLike = (0.0, 0.0, 1.0),
     size: float | None = None,
     name: str = "",
-) -> Edit:
+) -> Paste:
     """The edit that pastes a box [2,3] of another scene so that it stands on a point `at` [3].
 
     `up` [3] and `source_up` [3] are the unit directions that are up here and there; `size` is the longest

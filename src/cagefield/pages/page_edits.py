@@ -23,18 +23,16 @@ changed, which `part` says: the key of the one before, and the part's first bric
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.edits import EditStack
+from cagefield.edits import Continuous, Edit, PreparedEdit, PreparedStack
 from cagefield.edits.device import packing as row_layout
-from cagefield.edits.device.device_stack import DeviceStack
-from cagefield.edits.device.edit_lattice import nodes_of
-from cagefield.edits.edit import Edit
+from cagefield.edits.device_stack import DeviceStack
 from cagefield.errors import EditError
 from cagefield.pages.page_file import LEVEL, byte_planes, pack
 from cagefield.pages.page_layers import bricks_of, digest, encode_layer, layer_key
@@ -69,14 +67,14 @@ class PageEdits:
 
 def for_page(edit: Edit) -> Edit:
     """The edit itself, or the same with a lattice in its shell that a page can have."""
-    if edit.adjustment != "continuous" or (edit.lattice or FINEST_LATTICE + 1) <= FINEST_LATTICE:
+    if not isinstance(edit, Continuous) or (edit.lattice or FINEST_LATTICE + 1) <= FINEST_LATTICE:
         return edit
     return edit.replace(lattice=LATTICE if edit.lattice is None else FINEST_LATTICE)
 
 
-def for_pages(edits: EditStack) -> EditStack:
+def for_pages(edits: PreparedStack) -> PreparedStack:
     """The stack with a lattice in each continuous edit's shell."""
-    return EditStack(for_page(edit) for edit in edits)
+    return PreparedStack(replace(step, edit=for_page(step.edit)) for step in edits)
 
 
 def encode_page_edits(renderer: Renderer) -> bytes:
@@ -99,14 +97,14 @@ def encode_changed_edits(
     `level` is deflate's. Raises EditError as `encode_page_edits` does.
     """
     stack = DeviceStack.from_stack(renderer.edits)
-    edits = renderer.edits.active
-    table = page_rows(edits, stack)
+    steps = renderer.edits.steps
+    table = page_rows(steps, stack)
     lattices: list[dict[str, Any]] = []
     arrays: dict[str, NDArray[Any]] = {}
-    for edit, row in zip(edits, stack.params, strict=False):
-        if row[row_layout.CONTINUOUS] > 0.5:
-            nodes = nodes_of(edit)
-            key = _lattice_key(edit, nodes)
+    for step in steps:
+        if isinstance(step.edit, Continuous):
+            nodes = step.edit.lattice_nodes
+            key = _lattice_key(step.edit, nodes)
             if key not in has and all(key != before["key"] for before in lattices):
                 arrays[f"lattice.{len(lattices)}"] = byte_planes(nodes.reshape(-1).astype(np.float16))
             lattices.append({"key": key, "nodes": len(nodes)})
@@ -118,8 +116,8 @@ def encode_changed_edits(
         layers.append({"key": key, **bricks_of(layer, place)})
     occupancy, codes = _occupancy(renderer.occupancy, has, occupancies or {})
     header = {
-        "edits": len(edits),
-        "boxes": len(stack.boxes) if edits else 0,
+        "edits": len(steps),
+        "boxes": len(stack.boxes) if steps else 0,
         "preserve_opacity": renderer.preserve_opacity,
         "lattices": lattices,
         "layers": layers,
@@ -132,7 +130,7 @@ def encode_changed_edits(
     return PageEdits(pack(MAGIC, VERSION, header, arrays, level), keys, renderer.occupancy)
 
 
-def page_rows(edits: Sequence[Edit], stack: DeviceStack) -> Float32:
+def page_rows(edits: Sequence[PreparedEdit], stack: DeviceStack) -> Float32:
     """The rows [ROWS E + 2 B, 4] of a stack's active edits, packed in `stack`. Raises EditError as above."""
     boxes = stack.boxes if edits else np.zeros((0, 2, 3), np.float32)
     if ROWS * len(edits) + 2 * len(boxes) > MOST_ROWS:
@@ -140,8 +138,8 @@ def page_rows(edits: Sequence[Edit], stack: DeviceStack) -> Float32:
             f"{len(edits)} edits are more than a page's GPU takes; let the server draw, or bake some"
         )
     rows, first = [], 0
-    for edit, row in zip(edits, stack.params, strict=False):
-        rows.append(_rows(edit, row, first))
+    for step, row in zip(edits, stack.params, strict=False):
+        rows.append(_rows(step.edit, row, first))
         if row[row_layout.CONTINUOUS] > 0.5:
             nodes = round(float(row[row_layout.RESOLUTION])) ** 3
             first += -(-nodes // ROW_OF_NODES) * ROW_OF_NODES

@@ -22,8 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.edits import EditStack
-from cagefield.edits.device.device_stack import DeviceStack
+from cagefield.edits import EditMap, PreparedEdit
 from cagefield.edits.device.packing import (
     AFFINE,
     BOX,
@@ -39,7 +38,7 @@ from cagefield.edits.device.packing import (
     SIMPLE,
     UNDER,
 )
-from cagefield.edits.edit import Edit
+from cagefield.edits.device_stack import DeviceStack
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.pages.page_edits import page_rows
 from cagefield.pages.page_file import byte_planes, pack
@@ -53,14 +52,14 @@ MAGIC, VERSION = b"cagepath", 2
 class PathState:
     """A stack on the way: its active edits and, packed, their numbers and nodes; its layers' places."""
 
-    edits: tuple[Edit, ...]
+    edits: tuple[PreparedEdit, ...]
     packed: DeviceStack
     places: tuple[int, ...]
 
     @classmethod
-    def of(cls, edits: EditStack) -> PathState:
+    def of(cls, edits: EditMap) -> PathState:
         """Raises EditError for a stack that cannot be evaluated."""
-        return cls(edits.active, DeviceStack.from_stack(edits), edits.places)
+        return cls(edits.steps, DeviceStack.from_stack(edits), edits.places)
 
     @property
     def lattices(self) -> list[NDArray[np.float32]]:

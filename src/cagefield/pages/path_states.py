@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cagefield.cameras.keyframes import Keyframe, Timeline
 from cagefield.completion.patcher import Patcher
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Continuous, Delete, EditStack, PreparedEdit, PreparedStack
 from cagefield.edits.partial_edit import partial_edit
 from cagefield.edits.patch import Patch, SplatPatch
 from cagefield.errors import EditError
@@ -81,14 +81,14 @@ def path_edits(
         return None
     kept = renderer.preserve_opacity
     on_way = for_pages(patcher.prepare(edits.edits, moving=True, preserve_opacity=kept))
-    edits = for_pages(patcher.prepare(edits.edits, preserve_opacity=kept, bending=False))
+    whole = for_pages(patcher.prepare(edits.edits, preserve_opacity=kept, relight_continuous=False))
     knots = [parts_at(line, edits, t) for t in times]
     unique = list(dict.fromkeys(knots))
     moving = [n for n in range(len(edits)) if len({parts[n] for parts in unique}) > 1]
-    shells = [n for n in moving if edits[n].adjustment == "continuous"]
+    shells = [n for n in moving if isinstance(edits[n], Continuous)]
     lattices = sum(len({parts[n] for parts in unique}) for n in shells)
     nodes = next((r for r in SIZES if 6 * r**3 * lattices <= BUDGET), SIZES[-1])
-    stacks = {parts: stack_at(edits, parts, moving, nodes, on_way) for parts in unique}
+    stacks = {parts: stack_at(whole, parts, moving, nodes, on_way) for parts in unique}
     middles = [k for k in range(len(knots) - 1) if knots[k] != knots[k + 1]]
     total = len(stacks) + len(middles)
     states = {parts: PathState.of(stack) for parts, stack in stacks.items()}
@@ -99,7 +99,7 @@ def path_edits(
         found.append(renderer.occupancy)
         on_progress(len(found) / total)
     for k in middles:
-        middle = stack_at(edits, parts_at(line, edits, 0.5 * (times[k] + times[k + 1])), (), nodes, on_way)
+        middle = stack_at(whole, parts_at(line, edits, 0.5 * (times[k] + times[k + 1])), (), nodes, on_way)
         renderer = renderer.with_edits(middle)
         found.append(renderer.occupancy)
         one, other = states[knots[k]], states[knots[k + 1]]
@@ -150,52 +150,52 @@ def parts_at(line: Timeline, edits: EditStack, seconds: float) -> Parts:
 
 
 def stack_at(
-    edits: EditStack,
+    edits: PreparedStack,
     parts: Parts,
     moving: Sequence[int] = (),
     nodes: int = LATTICE,
-    on_way: EditStack | None = None,
-) -> EditStack:
+    on_way: PreparedStack | None = None,
+) -> PreparedStack:
     """The stack at these parts; the lattices of edits that move have at most `nodes` an axis.
 
     `on_way` has the patches of edits that have begun and not gone all the way; without, they are as `edits`'.
     """
-    found: list[Edit] = []
-    for number, (edit, part) in enumerate(zip(edits, parts, strict=True)):
+    found: list[PreparedEdit] = []
+    for number, (step, part) in enumerate(zip(edits, parts, strict=True)):
         try:
-            there = partial_edit(edit, max(part, LEAST))
+            there = partial_edit(step.edit, max(part, LEAST))
             if there is not None and there.enabled and not there.is_possible:
                 there.check()
         except EditError as error:
             raise EditError(f"the camera path shows an edit at {part:.0%} of its way: {error}") from None
         if there is None:
             continue
-        patch = _patch(edits, on_way or edits, parts, number)
-        if patch is not there.patch:
-            there = there.replace(patch=patch)
-        if number in moving and there.lattice is not None:
+        if number in moving and isinstance(there, Continuous) and there.lattice is not None:
             there = there.replace(lattice=min(nodes, there.lattice))
-        found.append(there)
-    return EditStack(found)
+        patch = _patch(edits, on_way or edits, parts, number)
+        found.append(PreparedEdit(there, patch, step.pasted))
+    return PreparedStack(found)
 
 
-def _patch(edits: EditStack, on_way: EditStack, parts: Parts, number: int) -> Patch | SplatPatch | None:
+def _patch(
+    edits: PreparedStack, on_way: PreparedStack, parts: Parts, number: int
+) -> Patch | SplatPatch | None:
     """The patch that an edit has at these parts.
 
     Patches show the result of the complete edits before them: there is none while one of these that reaches
     into its region is in motion.
     """
-    edit, part = edits[number], parts[number]
-    if part < 1.0 and not edit.deleted:
-        edit = on_way[number]
-    if edit.patch is None or part <= 0.0:
+    step, part = edits[number], parts[number]
+    if part < 1.0 and not isinstance(step.edit, Delete):
+        step = on_way[number]
+    if step.patch is None or part <= 0.0:
         return None
-    low, high = edit.patch.region.aabb
+    low, high = step.patch.region.aabb
     for before, there in zip(edits.edits[:number], parts, strict=False):
         meets = (before.boxes[:, 0] <= high) & (before.boxes[:, 1] >= low)
-        if there < 1.0 and before.enabled and meets.all(axis=1).any():
+        if there < 1.0 and before.edit.enabled and meets.all(axis=1).any():
             return None
-    return edit.patch
+    return step.patch
 
 
 def _distances(exact: PathState, one: PathState, other: PathState) -> NDArray[np.float64]:

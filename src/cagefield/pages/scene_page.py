@@ -169,7 +169,7 @@ def _splat_files(
     preserve_opacity, edits = scene.preserve_opacity, scene.patched_edits
     field = with_pasted(field, edits)
     found = {"field": encode_page_splats(field, background=scene.background)}
-    if edits.active:
+    if edits.steps:
         split = split_of(field, edits)
         changed = changed_splats(field, edits, preserve_opacity=preserve_opacity, split=split)
         found["edits"] = encode_page_splat_edits(field, changed, packed=True)

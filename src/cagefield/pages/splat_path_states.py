@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cagefield.cameras.keyframes import Keyframe, Timeline
 from cagefield.completion.patcher import Patcher
-from cagefield.edits import EditStack
+from cagefield.edits import EditStack, PreparedStack
 from cagefield.fields.splat_field import SplatField
 from cagefield.pages.page_splat_path import SPLAT_BYTES, SplatPathState, encode_page_splat_path
 from cagefield.pages.path_states import MOST_STATES, PathEdits, parts_at, stack_at, state_times
@@ -38,14 +38,15 @@ def splat_path_edits(
     if len(keys) < 2:
         return None
 
-    on_way, edits = patcher.prepare(edits.edits, moving=True), patcher.prepare(edits.edits, bending=False)
+    on_way = patcher.prepare(edits.edits, moving=True)
+    whole = patcher.prepare(edits.edits, relight_continuous=False)
     # With all that is pasted, also in states without it.
-    field = with_pasted(field, edits)
+    field = with_pasted(field, whole)
 
     # Split for the whole edits, once, so that the same splats are on their way in all states.
-    split: Split | None = split_of(field, edits)
+    split: Split | None = split_of(field, whole)
 
-    def state(stack: EditStack) -> SplatPathState:
+    def state(stack: PreparedStack) -> SplatPathState:
         changed = changed_splats(field, stack, preserve_opacity=preserve_opacity, split=split)
         return SplatPathState.of(field, changed, split)
 
@@ -53,10 +54,10 @@ def splat_path_edits(
     wanted = state_times(line, edits, MOST_STATES)
     if wanted is None:
         return None
-    size = SPLAT_BYTES * max(1, len(state(edits).sources))
+    size = SPLAT_BYTES * max(1, len(state(whole).sources))
     if split is not None and size * len(wanted) > BUDGET:
         split = None
-        size = SPLAT_BYTES * max(1, len(state(edits).sources))
+        size = SPLAT_BYTES * max(1, len(state(whole).sources))
     times = state_times(line, edits, int(np.clip(BUDGET // size, LEAST_STATES, MOST_STATES)))
     assert times is not None  # the path moves edits, see above
     knots = [parts_at(line, edits, t) for t in times]
@@ -64,18 +65,18 @@ def splat_path_edits(
     middles = [k for k in range(len(knots) - 1) if knots[k] != knots[k + 1]]
     total, states = len(unique) + len(middles), {}
     for parts in unique:
-        states[parts] = state(stack_at(edits, parts, on_way=on_way))
+        states[parts] = state(stack_at(whole, parts, on_way=on_way))
         on_progress(len(states) / total)
     errors: list[NDArray[np.float64]] = []
     for done, k in enumerate(middles, start=len(unique) + 1):
         one, other = states[knots[k]], states[knots[k + 1]]
         there = parts_at(line, edits, 0.5 * (times[k] + times[k + 1]))
-        middle = state(stack_at(edits, there, on_way=on_way))
+        middle = state(stack_at(whole, there, on_way=on_way))
         errors.append(_off(middle, one, other))
         on_progress(done / total)
-    whole = next((n for n, parts in enumerate(unique) if all(part == 1.0 for part in parts)), None)
+    last = next((n for n, parts in enumerate(unique) if all(part == 1.0 for part in parts)), None)
     data = encode_page_splat_path(
-        field, times, [unique.index(parts) for parts in knots], list(states.values()), whole
+        field, times, [unique.index(parts) for parts in knots], list(states.values()), last
     )
     off = np.concatenate([*errors, np.zeros(1)])
     error = float(off.mean()), float(np.percentile(off, 99))

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.edits import EditStack
-from cagefield.edits.device.device_stack import DeviceStack
+from cagefield.edits import EditMap
+from cagefield.edits.device_stack import DeviceStack
 from cagefield.fields.protocol import Field
 from cagefield.typing import Array, Float32
 
@@ -22,7 +22,7 @@ class EditedField:
     """
 
     field: Field
-    edits: EditStack
+    edits: EditMap
     bounds: NDArray[np.float64]
     preserve_opacity: bool = True
 
@@ -45,7 +45,7 @@ class EditedField:
         return np.where(places < 0, 0.0, sigma).astype(np.float32), rgb
 
 
-def edited_bounds(bounds: Array, edits: EditStack) -> NDArray[np.float64]:
+def edited_bounds(bounds: Array, edits: EditMap) -> NDArray[np.float64]:
     """The box [2,3] of a field's bounds and of all that active edits move somewhere else."""
-    boxes = np.concatenate([bounds[None], *(edit.boxes for edit in edits.active)])
+    boxes = np.concatenate([bounds[None], *(step.boxes for step in edits.steps)])
     return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])

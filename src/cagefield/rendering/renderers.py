@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cagefield.edits import EditStack
+from cagefield.edits import EditMap
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def renderer_of(
-    field: VoxelField | SplatField, edits: EditStack | None = None, *, preserve_opacity: bool = True
+    field: VoxelField | SplatField, edits: EditMap | None = None, *, preserve_opacity: bool = True
 ) -> AnyRenderer:
     """The renderer of the field's kind under the edits: the march through voxels, the rasteriser of splats.
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from cagefield.cameras.camera_paths import shared_up
 from cagefield.completion.pasting.paste_content import SourceContent, check_kinds, content_box
-from cagefield.edits import EditStack
+from cagefield.edits import EditStack, PreparedStack
 from cagefield.edits.paste_paths import resolved
 from cagefield.errors import EditError
 from cagefield.files.safe_open import real_path
@@ -53,7 +53,7 @@ class OpenedScene(Protocol):
     def preserve_opacity(self) -> bool: ...
 
     @property
-    def patched_edits(self) -> EditStack: ...
+    def patched_edits(self) -> PreparedStack: ...
 
 
 class SceneSources:

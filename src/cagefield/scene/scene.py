@@ -36,7 +36,7 @@ from numpy.typing import ArrayLike, NDArray
 from cagefield.cameras.camera import Camera
 from cagefield.cameras.camera_paths import shared_up
 from cagefield.completion.pasting.paste_content import content_box
-from cagefield.edits import Edit, EditStack, LatticeError
+from cagefield.edits import EditStack, LatticeError, Paste, PreparedStack
 from cagefield.edits.edit_files import dump_edits, load_edits
 from cagefield.edits.paste_paths import rebased
 from cagefield.edits.paste_placement import placed_paste
@@ -309,7 +309,7 @@ class Scene:
         at: ArrayLike | None = None,
         size: float | None = None,
         name: str | None = None,
-    ) -> Edit:
+    ) -> Paste:
         """The edit that pastes all of another scene, a scene folder or a file of splats, upright.
 
         Put it into a stack: `scene.with_edits(scene.edits.append(scene.paste("../chair")))`, and move, turn
@@ -405,8 +405,7 @@ class Scene:
 
         # Patches are voxels: too rough for what a continuous edit bends, and for parts with soft seams.
         edits = [edit.replace(feather=0.0) if edit.feather else edit for edit in self.edits]
-        patched = self.patcher.prepare(edits, bending=False)
-        exact = EditStack(edit.replace(lattice=None) for edit in patched)
+        exact = self.patcher.prepare(edits, relight_continuous=False).without_lattices()
         return render_nerf(
             original,
             camera,
@@ -442,7 +441,7 @@ class Scene:
         return Patcher(self.field, self.cameras.get("train", ()), render, PasteLoader(self.sources))
 
     @property
-    def patched_edits(self) -> EditStack:
+    def patched_edits(self) -> PreparedStack:
         """The edits with the patches that they ask for. Raises EditError for a paste that is not possible."""
         return self.patcher.prepare(self.edits.edits, preserve_opacity=self.preserve_opacity)
 
@@ -462,8 +461,8 @@ class Scene:
         return self.renderer.with_edits(self._exact_edits, preserve_opacity=self.preserve_opacity)
 
     @property
-    def _exact_edits(self) -> EditStack:
-        return EditStack(edit.replace(lattice=None) for edit in self.patched_edits)
+    def _exact_edits(self) -> PreparedStack:
+        return self.patched_edits.without_lattices()
 
 
 def _beside(box: Array, up: Array, size: Array) -> Array:

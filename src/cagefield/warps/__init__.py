@@ -6,32 +6,14 @@ float64 reference, vectorised over points [N,3]; `kernels.trilinear_hex`, `kerne
 `kernels.flow_shell` have the same maps for one sample in a kernel, `kernels.edit_maps` puts them together,
 and `device_stack` packs a stack of edits for it.
 
-One method per file; a continuous shell is chosen by its name in `SHELLS`.
+One method per file; `cagefield.edits.shells` builds a continuous edit's shell.
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from cagefield.warps.falloff import FALLOFFS, Falloff
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.interfaces import Mapped, Shell, Warp
 from cagefield.warps.trilinear_shell import TrilinearShell
 
-if TYPE_CHECKING:
-    from cagefield.geometry.cage import Cage
-
-
-def _trilinear(inner: Cage, deformed: Cage, outer: Cage, _falloff: Falloff) -> Shell:
-    return TrilinearShell(inner, deformed, outer)
-
-
-SHELLS: dict[str, Callable[[Cage, Cage, Cage, Falloff], Shell]] = {
-    "flow": FlowShell,
-    "trilinear": _trilinear,
-}
-"""Shell by name: called with (canonical inner, deformed inner, outer) cages and the falloff, which only the
-flow shell has."""
-
-__all__ = ["FALLOFFS", "SHELLS", "Falloff", "FlowShell", "Mapped", "Shell", "TrilinearShell", "Warp"]
+__all__ = ["FALLOFFS", "Falloff", "FlowShell", "Mapped", "Shell", "TrilinearShell", "Warp"]

@@ -14,7 +14,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from cagefield.completion.surfaces.grid_block import GridBlock, sample_edited_field
-from cagefield.edits import EditStack
+from cagefield.edits import EditMap
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Mask
 from cagefield.warps.hexahedron_map import HexahedronMap
@@ -25,7 +25,7 @@ RIM_NEIGHBORS = 24
 
 def clone_cage(
     block: GridBlock,
-    below: EditStack,
+    below: EditMap,
     cages: tuple[Cage, Cage],
     inside: Mask,
     surface: Mask,

@@ -17,7 +17,7 @@ from cagefield.completion.surfaces.patch_bounds import SUPPORT_DISTANCE_VOXELS
 from cagefield.completion.surfaces.support_plane import find_support
 from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.completion.surfaces.visibility import CameraVisibility
-from cagefield.edits.stack import EditStack
+from cagefield.edits import EditMap
 from cagefield.typing import Mask
 
 TOUCH_DISTANCE_VERTICES = 4
@@ -29,7 +29,7 @@ def close_cut_end(
     inside: Mask,
     part: Surfels,
     light: LightChange | None,
-    below: EditStack,
+    below: EditMap,
     visibility: CameraVisibility | None,
 ) -> GridBlock:
     """Block of a part with its face inpainted where the part was held; unchanged without such a face.

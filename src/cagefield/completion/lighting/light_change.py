@@ -16,8 +16,8 @@ from cagefield.completion.surfaces.visibility import (
     CameraVisibility,
     count_edited_views,
 )
+from cagefield.edits import EditMap
 from cagefield.edits.patch import NewLight
-from cagefield.edits.stack import EditStack
 from cagefield.typing import Array, Mask
 
 MAX_TRUSTED_LOG_GAIN = 0.6
@@ -108,7 +108,7 @@ def apply_light(block: GridBlock, light: LightChange | None) -> GridBlock:
 
 
 def is_reliable(
-    points: Array, below: EditStack, visibility: CameraVisibility, block: GridBlock, light: LightChange | None
+    points: Array, below: EditMap, visibility: CameraVisibility, block: GridBlock, light: LightChange | None
 ) -> NDArray[np.bool_]:
     """Mask [N] of surface points [N,3] that cameras saw well enough for the new light of a block.
 

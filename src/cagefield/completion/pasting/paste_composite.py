@@ -21,7 +21,7 @@ from cagefield.completion.surfaces.grid_block import (
     sample_edited_field,
     world_positions,
 )
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import EditMap, EditStack, Paste
 from cagefield.edits.patch import Pasted
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.typing import Array, Float32, Mask
@@ -29,14 +29,13 @@ from cagefield.warps.hexahedron_map import HexahedronMap
 
 
 def composite_paste(
-    field: VoxelField, below: EditStack, edit: Edit, *, preserve_opacity: bool = True
+    field: VoxelField, below: EditMap, edit: Paste, pasted: Pasted, *, preserve_opacity: bool = True
 ) -> Pasted:
     """Content of a paste, composited with the field under the edits below in V.
 
     The paste's own content where V covers no part of the field.
     """
-    pasted = edit.pasted
-    if pasted is None or pasted.part is None or pasted.place is None:
+    if pasted.part is None or pasted.place is None:
         raise edit.unread()
     block = _layer_block(pasted.part)
     onto = HexahedronMap(edit.deformed, pasted.place)
@@ -102,7 +101,7 @@ def _stored_mask(field: VoxelField) -> Mask:
     return stored
 
 
-def _is_near(field: VoxelField, below: EditStack, stored: Mask, points: Array) -> Mask:
+def _is_near(field: VoxelField, below: EditMap, stored: Mask, points: Array) -> Mask:
     """Mask [N] of points [N,3] beside a vertex of `stored` [X,Y,Z], or in the boxes of edits."""
     last = np.array(field.resolution) - 1
     g = np.round(field.grid_coordinates(points)).astype(np.int64)

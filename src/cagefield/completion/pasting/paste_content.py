@@ -24,7 +24,7 @@ from cagefield.completion.surfaces.grid_block import (
     sample_edited_field,
     world_positions,
 )
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditMap, EditStack
 from cagefield.edits.patch import Pasted
 from cagefield.errors import EditError
 from cagefield.fields.splat_field import SplatField
@@ -46,7 +46,7 @@ class SourceContent:
     """Another scene: its field, its edits with their patches, and its `preserve_opacity`."""
 
     field: VoxelField | SplatField
-    edits: EditStack
+    edits: EditMap
     preserve_opacity: bool = True
 
 

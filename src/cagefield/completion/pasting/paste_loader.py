@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import Protocol
 
 from cagefield.completion.pasting.paste_content import SourceContent, extract_content
-from cagefield.edits import Edit
+from cagefield.edits import Edit, Paste, PreparedEdit
 from cagefield.edits.patch import Pasted
 from cagefield.errors import CagefieldError, EditError
 from cagefield.fields.splat_field import SplatField
@@ -44,20 +44,20 @@ class PasteLoader:
         *,
         preserve_opacity: bool = True,
         proceed: Callable[[], None] | None = None,
-    ) -> list[Edit]:
+    ) -> list[PreparedEdit]:
         """Edits, with the content of those that paste.
 
         Raises EditError, which names the edit, if a scene is missing or cannot be pasted.
         """
         loaded, used = [], {}
         for edit in edits:
-            if edit.source is not None and edit.enabled:
+            content = None
+            if isinstance(edit, Paste) and edit.enabled:
                 if proceed is not None:
                     proceed()
-                key, content = self._load(edit, edit.source, field, preserve_opacity)
+                key, content = self._load(edit, field, preserve_opacity)
                 used[key] = content
-                edit = edit.replace(pasted=content)
-            loaded.append(edit)
+            loaded.append(PreparedEdit(edit, pasted=content))
         if used and isinstance(field, VoxelField):
             _check_size(used.values(), field)
         unused = [(key, content) for key, content in self._cache.items() if key not in used]
@@ -65,13 +65,13 @@ class PasteLoader:
         return loaded
 
     def _load(
-        self, edit: Edit, source: str, field: VoxelField | SplatField, preserve_opacity: bool
+        self, edit: Paste, field: VoxelField | SplatField, preserve_opacity: bool
     ) -> tuple[Hashable, Pasted]:
         """(cache key, content) of a paste."""
         try:
-            key = (self._library.state(source), edit.inner, preserve_opacity)
+            key = (self._library.state(edit.source), edit.inner, preserve_opacity)
             if key not in self._cache:
-                content = self._library.read(source)
+                content = self._library.read(edit.source)
                 self._cache[key] = extract_content(
                     content, edit.inner, field, preserve_opacity=preserve_opacity
                 )

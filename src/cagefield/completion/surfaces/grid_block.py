@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.edits import EditStack
+from cagefield.edits import EditMap
 from cagefield.fields.contraction import uncontract
 from cagefield.fields.sh import C0, scale_sh_colors
 from cagefield.fields.sh_rotation import rotate_sh_each
@@ -235,7 +235,7 @@ GridValues = NDArray[np.floating] | NDArray[np.bool_]
 
 
 def extract_block(
-    field: VoxelField, below: EditStack, box: Array, *, preserve_opacity: bool = True
+    field: VoxelField, below: EditMap, box: Array, *, preserve_opacity: bool = True
 ) -> GridBlock:
     """Block that holds a world-space box [2,3], of a field under edits.
 
@@ -251,7 +251,7 @@ def extract_block(
     # A normal needs three vertices along each axis.
     shape = np.minimum(np.maximum(high - low + 1, 3), last - low + 1)
     block = _extract_stored(field, low, shape)
-    if not below.active:
+    if not below.steps:
         return block
     parts = [
         _sample_changed(
@@ -296,7 +296,7 @@ def _extract_stored(field: VoxelField, low: NDArray[np.int64], shape: NDArray[np
 
 
 def _sample_changed(
-    block: GridBlock, below: EditStack, rows: NDArray[np.int64], preserve_opacity: bool
+    block: GridBlock, below: EditMap, rows: NDArray[np.int64], preserve_opacity: bool
 ) -> tuple[NDArray[np.int64], Float32, Float32]:
     """(rows [M], density [M], sh [M,K,3]) of the vertices among `rows` that the edits change."""
     points = world_positions(block.field, np.stack(np.unravel_index(rows, block.shape), axis=1) + block.low)
@@ -314,7 +314,7 @@ def _sample_changed(
 
 def sample_edited_field(
     field: VoxelField,
-    below: EditStack,
+    below: EditMap,
     points: Array,
     turn: Array | None = None,
     *,

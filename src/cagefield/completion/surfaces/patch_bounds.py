@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.edits import Edit
+from cagefield.edits import Edit, Paste
 from cagefield.typing import Array
 
 SUPPORT_DISTANCE_VOXELS = 6.0
@@ -48,13 +48,13 @@ def patch_box(
         include_destination: whether the patch changes light, or blends a seam, at the part's new place.
         shadow_directions: directions [K,3] of cast shadows.
     """
-    box = edit.inner.aabb if edit.source is None else edit.deformed.aabb
+    box = edit.inner.aabb if not isinstance(edit, Paste) else edit.deformed.aabb
     box = extrude_box(box, shadow_directions)
     margin = max(SUPPORT_DISTANCE_VOXELS * voxel, 0.5 * float(np.median(box[1] - box[0])))
     if max_radius > 0.0:
         margin = max(margin, 1.5 * max_radius + SUPPORT_DISTANCE_VOXELS * voxel)
     if include_destination and (
-        max_radius > 0.0 or len(shadow_directions) or (edit.feather > 0.0 and edit.source is None)
+        max_radius > 0.0 or len(shadow_directions) or (edit.feather > 0.0 and not isinstance(edit, Paste))
     ):
         destination = extrude_box(edit.deformed.aabb, shadow_directions)
         box = np.stack([np.minimum(box[0], destination[0]), np.maximum(box[1], destination[1])])

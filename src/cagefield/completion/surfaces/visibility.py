@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from cagefield.cameras.camera import Camera
 from cagefield.completion.surfaces.surfels import Surfels, concatenate_surfels
-from cagefield.edits.stack import EditStack
+from cagefield.edits import EditMap
 from cagefield.images.render_result import RenderResult
 from cagefield.typing import Array, Mask
 
@@ -96,7 +96,7 @@ class CameraVisibility:
 
 
 def count_edited_views(
-    points: Array, below: EditStack, visibility: CameraVisibility, tolerance: float
+    points: Array, below: EditMap, visibility: CameraVisibility, tolerance: float
 ) -> NDArray[np.int64]:
     """Number of cameras [N] that see points [N,3] of the deformed space of the edits below.
 

@@ -1,4 +1,4 @@
-"""The lattice of an edit, sampled by a Quadrants kernel in float32 and kept while the edit lives."""
+"""The lattice of a continuous map, sampled by a Quadrants kernel in float32."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from cagefield.compute import devices
 from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.devices import floats
-from cagefield.compute.identity_memo import memoized_by_identity
 from cagefield.edits.device.kernels.edit_lattice import sample_lattice
-from cagefield.edits.device.packing import RESOLUTION, SIMPLE, PackedEdit, row_of
+from cagefield.edits.device.packing import pack_warp
 from cagefield.errors import EditError
 from cagefield.files import memory
 from cagefield.warps import flow_lattice
@@ -37,23 +36,12 @@ interpolation's own error, worst of the edits, in the mean and in the largest er
 """
 
 
-def lattice_of(edit: PackedEdit) -> Lattice:
-    """The lattice of a continuous edit as the renderer has it, for the float64 reference.
+def sample_nodes(warp: ContinuousWarp, resolution: int) -> NDArray[np.float32]:
+    """The nodes [R^3,3] of a continuous map's lattice, displacements in world units, x fastest.
 
-    Raises `DeviceError` where no device starts, `EditError` for edits without a lattice.
+    Raises `DeviceError` where no device starts, and `EditError` where the lattice and the arrays made of it
+    would take most of the free memory.
     """
-    warp, R = _warp_and_resolution(edit)
-    origin, frame = warp.outer.frame
-    return Lattice(origin, frame, nodes_of(edit).reshape(R, R, R, 3).astype(np.float64))
-
-
-@memoized_by_identity
-def nodes_of(edit: PackedEdit) -> NDArray[np.float32]:
-    """The nodes [R^3,3] of a continuous edit's lattice, x fastest; raises as `lattice_of` does.
-
-    `EditError` too where they and what is made of them would take most of the memory that is free.
-    """
-    warp, resolution = _warp_and_resolution(edit)
     _check_memory(resolution)
     devices.start()
     if isinstance(warp.shell, FlowShell):
@@ -66,8 +54,7 @@ def nodes_of(edit: PackedEdit) -> NDArray[np.float32]:
         return nodes
     origin, frame = warp.outer.frame
     place = (floats(origin), floats(frame), resolution)
-    params = row_of(edit)[None].copy()
-    params[0, [RESOLUTION, SIMPLE]] = 0.0
+    params = pack_warp(warp, warp.outer.aabb[None])[None]
     sample_lattice(
         nodes, block_cyclic_schedule(len(nodes)), params, np.zeros((1, 3), dtype=np.float32), *place
     )
@@ -81,10 +68,3 @@ def _check_memory(resolution: int) -> None:
             f"a lattice of {resolution} nodes per axis takes {needed / 1e9:.1f} GB, of the "
             f"{free / 1e9:.1f} GB that are free at most half is taken; give it a lower resolution"
         )
-
-
-def _warp_and_resolution(edit: PackedEdit) -> tuple[ContinuousWarp, int]:
-    warp, resolution = edit.exact_warp, edit.lattice
-    if not isinstance(warp, ContinuousWarp) or resolution is None:
-        raise EditError("only a continuous edit with a lattice has one")
-    return warp, resolution

@@ -11,19 +11,16 @@ trilinear shell.
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.compute.identity_memo import memoized_by_identity
 from cagefield.errors import EditError
 from cagefield.geometry import hexahedron
 from cagefield.typing import Array
+from cagefield.warps import Warp
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.flow_shell import FlowShell
-from cagefield.warps.interfaces import Warp
 from cagefield.warps.trilinear_shell import TrilinearShell
 
 # Columns.
@@ -51,62 +48,32 @@ BOX_SLACK = 1e-5
 """Boxes are this share of their size larger than the edit, so that no float32 sample inside it is missed."""
 
 
-class PackedEdit(Protocol):
-    """What of an edit is packed."""
+def pack_warp(warp: Warp, boxes: Array, lattice: int | None = None) -> NDArray[np.float32]:
+    """The row [WIDTH] of a map in `boxes` [B,2,3], but for the columns that depend on others in its stack.
 
-    @property
-    def exact_warp(self) -> Warp: ...
-
-    @property
-    def lattice(self) -> int | None: ...
-
-    @property
-    def boxes(self) -> Array: ...
-
-    @property
-    def under(self) -> object | None: ...
-
-    @property
-    def part(self) -> object | None: ...
-
-    def unread(self) -> EditError: ...
-
-
-@memoized_by_identity
-def row_of(edit: PackedEdit) -> NDArray[np.float32]:
-    """The row [WIDTH] of an edit, but for what depends on the others in its stack.
-
-    Raises `EditError` for an edit without a kernel.
+    `lattice` is the resolution of the lattice from which a shell is interpolated, None evaluates it exactly.
+    Raises `EditError` for a map without a kernel.
     """
     row = np.zeros(WIDTH, dtype=np.float32)
-    _pack(row, edit)
-    warp = edit.exact_warp
-    if edit.lattice is not None and isinstance(warp, ContinuousWarp):
-        row[RESOLUTION] = edit.lattice
-        row[NODE_BOX : NODE_BOX + 3] = -EDGE * edit.lattice
-        row[NODE_BOX + 3 : NODE_BOX + 6] = edit.lattice - 1 + EDGE * edit.lattice
-        row[SIMPLE] = row[RECORDS + AFFINE] == 1.0 and warp.outer.is_affine
-    elif isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell):
-        row[RESOLUTION] = FLOW
+    row[BOX : BOX + 6] = widened(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])[None]).ravel()
+    if isinstance(warp, DiscreteWarp):
+        _pack_discrete(row, warp)
+    elif isinstance(warp, ContinuousWarp):
+        _pack_continuous(row, warp, lattice)
+    else:
+        raise EditError(f"a {type(warp).__name__} has no kernel")
     return row
 
 
-def _pack(row: NDArray[np.float32], edit: PackedEdit) -> None:
-    """Write an edit into its row, with its shell exact."""
-    boxes = edit.boxes
-    row[BOX : BOX + 6] = widened(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])[None]).ravel()
-    warp = edit.exact_warp
-    if isinstance(warp, DiscreteWarp):
-        row[FIRST], row[LAST] = int(warp.inner is None), 1 if warp.region is None else 2
-        row[UNDER] = EMPTY
-        if warp.pasted and edit.part is None:
-            raise edit.unread()
-        if warp.inner is not None:
-            _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
-        _record(row, 1, (warp.region or warp.source).corners)
-        return
-    if not isinstance(warp, ContinuousWarp):
-        raise EditError(f"a {type(warp).__name__} has no kernel")
+def _pack_discrete(row: NDArray[np.float32], warp: DiscreteWarp) -> None:
+    row[FIRST], row[LAST] = int(warp.inner is None), 1 if warp.region is None else 2
+    row[UNDER] = EMPTY
+    if warp.inner is not None:
+        _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
+    _record(row, 1, (warp.region or warp.source).corners)
+
+
+def _pack_continuous(row: NDArray[np.float32], warp: ContinuousWarp, lattice: int | None) -> None:
     row[FIRST], row[LAST], row[CONTINUOUS] = 0, 2, 1
     _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
     _record(row, 1, warp.outer.corners)
@@ -114,12 +81,18 @@ def _pack(row: NDArray[np.float32], edit: PackedEdit) -> None:
         row[LAST] = 8
         for n in range(6):
             _record(row, 2 + n, warp.shell.deformed_hexahedra[n], warp.shell.canonical_hexahedra[n])
-    elif not isinstance(warp.shell, FlowShell) and edit.lattice is None:
+    elif not isinstance(warp.shell, FlowShell) and lattice is None:
         raise EditError(f"a {type(warp.shell).__name__} has no kernel; set a lattice")
     origin, frame = warp.outer.frame
     row[TO_NODES : TO_NODES + 3] = origin
-    if edit.lattice is not None:
-        row[TO_NODES + 3 : TO_NODES + 12] = ((edit.lattice - 1) * np.linalg.inv(frame)).ravel()
+    if lattice is not None:
+        row[TO_NODES + 3 : TO_NODES + 12] = ((lattice - 1) * np.linalg.inv(frame)).ravel()
+        row[RESOLUTION] = lattice
+        row[NODE_BOX : NODE_BOX + 3] = -EDGE * lattice
+        row[NODE_BOX + 3 : NODE_BOX + 6] = lattice - 1 + EDGE * lattice
+        row[SIMPLE] = row[RECORDS + AFFINE] == 1.0 and warp.outer.is_affine
+    elif isinstance(warp.shell, FlowShell):
+        row[RESOLUTION] = FLOW
 
 
 def _record(row: NDArray[np.float32], number: int, corners: Array, onto: Array | None = None) -> None:

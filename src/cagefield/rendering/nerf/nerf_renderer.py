@@ -120,7 +120,7 @@ def _traced(
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Results of `trace`, and normals [N,3], or [N,0] unless requested."""
     mapped = None
-    if edits is not None and len(edits.active):
+    if edits is not None and len(edits.steps):
         mapped = TensorMap(edits, field.device, preserve_opacity=preserve_opacity)
     parts = []
     with torch.no_grad():

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import torch
@@ -12,19 +12,12 @@ from numpy.typing import NDArray
 from cagefield.compute import devices
 from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.quadrants import take_tensors
-from cagefield.edits.device.device_stack import DeviceStack, PackedStack
+from cagefield.edits import EditMap
 from cagefield.edits.device.kernels.edit_maps import EditArgs
-from cagefield.fields.voxel_field import VoxelField
+from cagefield.edits.device_stack import DeviceStack
 from cagefield.rendering.nerf.kernels.torch_edit_map import map_tensors
 
 take_tensors(torch.Tensor)
-
-
-class LayeredStack(PackedStack, Protocol):
-    """What of an edit stack is packed, and the layers of its patches."""
-
-    @property
-    def layers(self) -> Sequence[VoxelField]: ...
 
 
 class TensorMap:
@@ -36,7 +29,7 @@ class TensorMap:
 
     def __init__(
         self,
-        edits: LayeredStack,
+        edits: EditMap,
         device: torch.device,
         *,
         preserve_opacity: bool = True,

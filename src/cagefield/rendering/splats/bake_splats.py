@@ -14,7 +14,7 @@ import dataclasses
 
 import numpy as np
 
-from cagefield.edits import EditStack
+from cagefield.edits import EditMap
 from cagefield.fields.sh_rotation import rotate_sh_each
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.quaternions import quaternions_from_matrices, rotation_matrices
@@ -25,7 +25,7 @@ from cagefield.typing import Array, Float32
 
 
 def baked_splats(
-    field: SplatField, edits: EditStack, *, preserve_opacity: bool = True, split: bool = True
+    field: SplatField, edits: EditMap, *, preserve_opacity: bool = True, split: bool = True
 ) -> SplatField:
     """The splats that edits make of a field; those that no edit reaches come first, as they were.
 
@@ -34,7 +34,7 @@ def baked_splats(
     Raises:
         EditError: an edit that cannot be evaluated.
     """
-    if not edits.active:
+    if not edits.steps:
         return field
     field = with_pasted(field, edits)
     moved = moved_splats(field, edits)
@@ -44,7 +44,7 @@ def baked_splats(
         moved = moved.without(found.parents)
         parts.append(_baked(found.children, moved_splats(found.children, edits), preserve_opacity))
     parts.insert(0, _baked(field, moved, preserve_opacity))
-    boxes = np.concatenate([field.bounds[None], *(edit.boxes for edit in edits.active)])
+    boxes = np.concatenate([field.bounds[None], *(step.boxes for step in edits.steps)])
     means, log_scales, quaternions, opacities, sh = (
         np.concatenate([part[n] for part in parts]) for n in range(5)
     )

@@ -24,7 +24,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.edits import EditStack
+from cagefield.edits import EditMap
 from cagefield.fields.sh import scale_sh_colors
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.quaternions import rotation_matrices
@@ -93,7 +93,7 @@ _of_fields: WeakKeyDictionary[SplatField, DeformedSplats] = WeakKeyDictionary()
 
 def deformed_splats(
     field: SplatField,
-    edits: EditStack,
+    edits: EditMap,
     *,
     preserve_opacity: bool = True,
     coarse: bool = False,
@@ -197,7 +197,7 @@ class ChangedSplats:
 
 def changed_splats(
     field: SplatField,
-    edits: EditStack,
+    edits: EditMap,
     *,
     preserve_opacity: bool = True,
     coarse: bool = False,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Copy, Edit, EditMap, EditStack, Paste, PreparedStack
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.rendering.splats.raster_splats import DeformedSplats
@@ -12,7 +12,7 @@ from cagefield.rendering.splats.splat_provenance import at_rest, pasted_rows, wi
 
 
 def deformed_splats_reference(
-    field: SplatField, edits: EditStack, *, preserve_opacity: bool = True
+    field: SplatField, edits: EditMap, *, preserve_opacity: bool = True
 ) -> DeformedSplats:
     """The splats that edits make of a field, in any order: those of all that is shown of each splat's mean.
 
@@ -21,17 +21,18 @@ def deformed_splats_reference(
     field = with_pasted(field, edits)
     source = np.flatnonzero(~at_rest(field))
     p, J = field.means[source].astype(np.float64), np.tile(np.eye(3), (len(source), 1, 1))
-    for edit in edits.active:
-        mapped = EditStack([edit]).to_deformed(p)
+    for step in edits.steps:
+        edit = step.edit
+        mapped = PreparedStack([step]).to_deformed(p)
         shown = ~mapped.hidden
         parts = [(source[shown], mapped.points[shown], (mapped.jacobian @ J)[shown])]
-        if edit.source is not None:
-            rows = pasted_rows(field, edit)
-            there = EditStack([Edit(edit.inner, adjustment="discrete", operations=edit.operations)])
+        if isinstance(edit, Paste):
+            rows = pasted_rows(field, step)
+            there = EditStack([Edit.move(edit.inner, operations=edit.operations)])
             moved = there.to_deformed(field.means[rows])
             inside = edit.inner.contains(field.means[rows].astype(np.float64))
             parts.append((rows[inside], moved.points[inside], moved.jacobian[inside]))
-        elif edit.adjustment == "discrete" and edit.keep_source:
+        elif isinstance(edit, Copy):
             original = edit.inner.contains(p) & ~edit.deformed.contains(p)
             parts.append((source[original], p[original], J[original]))
         source, p, J = (np.concatenate([part[n] for part in parts]) for n in range(3))

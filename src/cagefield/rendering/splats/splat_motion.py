@@ -22,7 +22,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditMap, Paste, PreparedEdit
 from cagefield.edits.patch import SplatPatch
 from cagefield.fields.sh import scale_sh_colors
 from cagefield.fields.splat_field import SplatField
@@ -91,20 +91,20 @@ class MovedSplats:
         return MovedSplats(self.left | gone, self.source[kept], self.points[kept], self.jacobian[kept], gains)
 
     def then(
-        self, edit: Edit, field: SplatField, coarse: bool, proceed: Callable[[], None] | None
+        self, step: PreparedEdit, field: SplatField, coarse: bool, proceed: Callable[[], None] | None
     ) -> MovedSplats:
         """Moved splats after one more edit. Raises `EditError` where it cannot be evaluated."""
-        moved, carried = self._moved(edit, field.means, coarse, proceed)
-        if edit.source is not None:
-            moved, carried = moved._with(edit, field)
-        if isinstance(edit.patch, SplatPatch):
-            return moved._patched(edit, edit.patch, field, carried)
+        moved, carried = self._moved(step, field.means, coarse, proceed)
+        if isinstance(step.edit, Paste):
+            moved, carried = moved._with(step, field)
+        if isinstance(step.patch, SplatPatch):
+            return moved._patched(step.edit, step.patch, field, carried)
         return moved
 
-    def _with(self, edit: Edit, field: SplatField) -> tuple[MovedSplats, Array]:
+    def _with(self, step: PreparedEdit, field: SplatField) -> tuple[MovedSplats, Array]:
         """(these and the pasted splats of an edit, source positions [C,3] of those last rows)."""
-        rows = pasted_rows(field, edit)
-        inside, points, jacobian = HexahedronMap(edit.deformed, edit.inner)(
+        rows = pasted_rows(field, step)
+        inside, points, jacobian = HexahedronMap(step.edit.deformed, step.edit.inner)(
             field.means[rows].astype(np.float64)
         )
         gains = None
@@ -120,14 +120,13 @@ class MovedSplats:
         ), field.means[rows].astype(np.float64)
 
     def _moved(
-        self, edit: Edit, means: NDArray[np.float32], coarse: bool, proceed: Callable[[], None] | None
+        self, step: PreparedEdit, means: NDArray[np.float32], coarse: bool, proceed: Callable[[], None] | None
     ) -> tuple[MovedSplats, Array]:
         """(these after an edit's map, source positions [C,3] of its last rows)."""
         from cagefield.rendering.splats.kernels.deformation import changes, in_boxes, times
 
-        warp = edit.exact_warp
-        cages = [edit.inner.aabb] if edit.outer is None else [edit.inner.aabb, edit.outer.aabb]
-        reach = np.concatenate([edit.boxes, np.stack(cages)])
+        warp = step.exact_warp
+        reach = np.concatenate([step.boxes, step.edit.inner.aabb[None]])
         at_rest, elsewhere = np.empty(len(means), bool), np.empty(len(self.source), bool)
         in_boxes(means, reach, at_rest)
         if len(elsewhere):
@@ -176,7 +175,7 @@ class MovedSplats:
         in_boxes(field.means, patch.region.aabb[None], inside)
         still = np.flatnonzero(inside & ~self.left)
         points = np.concatenate([field.means[still].astype(np.float64), self.points[:here]])
-        outside = np.ones(len(points), bool) if edit.source is not None else ~edit.inner.contains(points)
+        outside = np.ones(len(points), bool) if isinstance(edit, Paste) else ~edit.inner.contains(points)
         gone = patch.takes_away(points) & outside
         log = np.where(outside, patch.light.at(points), 0.0)
         lit = np.flatnonzero((np.abs(log[: len(still)]) > UNSEEN) & ~gone[: len(still)])
@@ -200,7 +199,7 @@ class MovedSplats:
 class _KnownStack:
     """Moved splats of a field after a stack's active edits."""
 
-    edits: tuple[Edit, ...]
+    edits: tuple[PreparedEdit, ...]
     coarse: bool
     moved: MovedSplats
 
@@ -210,7 +209,7 @@ known_stacks: WeakKeyDictionary[SplatField, list[_KnownStack]] = WeakKeyDictiona
 
 def moved_splats(
     field: SplatField,
-    edits: EditStack,
+    edits: EditMap,
     *,
     coarse: bool = False,
     proceed: Callable[[], None] | None = None,
@@ -221,7 +220,7 @@ def moved_splats(
 
     Results of the first edits are cached between calls. `coarse` and `proceed` as for `to_deformed`.
     """
-    active = edits.active
+    active = edits.steps
     known = known_stacks.setdefault(field, [])
     usable = [k for k in known if k.edits == active[: len(k.edits)] and (coarse or not k.coarse)]
     start = max(usable, key=lambda k: (len(k.edits), not k.coarse), default=None)

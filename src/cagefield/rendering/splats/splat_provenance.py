@@ -14,7 +14,7 @@ from weakref import WeakKeyDictionary, ref
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import EditMap, Paste, PreparedEdit
 from cagefield.fields.splat_field import SplatField
 from cagefield.typing import Float32, Mask
 
@@ -40,7 +40,7 @@ _joined: WeakKeyDictionary[SplatField, list[tuple[Pasted, SplatField]]] = WeakKe
 _origins: WeakKeyDictionary[SplatField, _Origins] = WeakKeyDictionary()
 
 
-def with_pasted(field: SplatField, edits: EditStack) -> SplatField:
+def with_pasted(field: SplatField, edits: EditMap) -> SplatField:
     """Field with the splats that active edits paste behind its own; itself without pastes, or with them
     joined.
 
@@ -48,7 +48,7 @@ def with_pasted(field: SplatField, edits: EditStack) -> SplatField:
     """
     if field in _origins:
         return field
-    pasted = tuple(dict.fromkeys(edit.pasted.splats for edit in edits.active if edit.pasted is not None))
+    pasted = tuple(dict.fromkeys(step.pasted.splats for step in edits.steps if step.pasted is not None))
     splats = tuple(part for part in pasted if part is not None)
     if not splats:
         return field
@@ -63,18 +63,18 @@ def with_pasted(field: SplatField, edits: EditStack) -> SplatField:
     return found
 
 
-def pasted_rows(field: SplatField, edit: Edit) -> NDArray[np.int64]:
+def pasted_rows(field: SplatField, step: PreparedEdit) -> NDArray[np.int64]:
     """The rows of a joined field that an edit pastes; none for an edit that does not.
 
     Raises EditError for a paste without its content.
     """
-    if edit.source is None:
+    if not isinstance(step.edit, Paste):
         return np.zeros(0, np.int64)
     origins = _origins.get(field)
     for number, part in enumerate(() if origins is None else origins.pasted):
-        if origins is not None and edit.pasted is not None and part is edit.pasted.splats:
+        if origins is not None and step.pasted is not None and part is step.pasted.splats:
             return np.flatnonzero(origins.number == number)
-    raise edit.unread()
+    raise step.edit.unread()
 
 
 def at_rest(field: SplatField) -> Mask:

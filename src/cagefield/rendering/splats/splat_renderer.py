@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
-from cagefield.edits import EditStack
+from cagefield.edits import EditMap, EditStack
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.images.render_result import Background, RenderResult
@@ -54,13 +54,13 @@ class SplatRenderer:
     def __init__(
         self,
         field: SplatField,
-        edits: EditStack | None = None,
+        edits: EditMap | None = None,
         *,
         preserve_opacity: bool = True,
     ) -> None:
         """Raises EditError where an edit cannot be evaluated."""
         self.field = field
-        self.edits = edits if edits is not None else EditStack([])
+        self.edits: EditMap = edits if edits is not None else EditStack([])
         self.preserve_opacity = preserve_opacity
         self.splats: DeformedSplats = deformed_splats(
             field, self.edits, preserve_opacity=preserve_opacity, split=split_of(field, self.edits)
@@ -71,7 +71,7 @@ class SplatRenderer:
 
     def with_edits(
         self,
-        edits: EditStack,
+        edits: EditMap,
         *,
         preserve_opacity: bool | None = None,
         coarse: bool = False,

@@ -49,7 +49,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Copy, Delete, Discrete, Edit, EditMap, Paste, PreparedEdit, PreparedStack
 from cagefield.edits.patch import SplatPatch
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import FACES, Cage
@@ -115,7 +115,7 @@ class Split:
     sources: NDArray[np.int64]
 
 
-def split_for_edits(field: SplatField, edits: EditStack) -> SplatField:
+def split_for_edits(field: SplatField, edits: EditMap) -> SplatField:
     """The field with those splats split that one Gaussian each does not show under the edits.
 
     The field itself where none is; children come last. Raises as `split_of`.
@@ -124,9 +124,7 @@ def split_for_edits(field: SplatField, edits: EditStack) -> SplatField:
     return field if split is None else _joined([_taken(field, ~split.parents), split.children])
 
 
-def split_of(
-    field: SplatField, edits: EditStack, *, proceed: Callable[[], None] | None = None
-) -> Split | None:
+def split_of(field: SplatField, edits: EditMap, *, proceed: Callable[[], None] | None = None) -> Split | None:
     """Split of the splats that one Gaussian each cannot represent under the edits, or None.
 
     Pasted splats are counted behind the field's (`pasted_splats.with_pasted`).
@@ -136,7 +134,7 @@ def split_of(
     Raises:
         EditError: an edit that cannot be evaluated.
     """
-    active = edits.active
+    active = edits.steps
     if not active:
         return None
     field = with_pasted(field, edits)
@@ -147,17 +145,17 @@ def split_of(
     parents = np.zeros(len(field), bool)
     children: SplatField | None = None
     sources = np.zeros(0, np.int64)
-    for count, edit in enumerate(active):
-        before = EditStack(active[:count])
+    for count, step in enumerate(active):
+        before = PreparedStack(active[:count])
         parts: list[_Part] = []
         if children is not None:
-            stay, others = _settled(children, before, edit, None, most - len(children), proceed)
+            stay, others = _settled(children, before, step, None, most - len(children), proceed)
             parts = [
                 (_taken(children, stay), sources[stay]),
                 *((part, sources[rows]) for part, rows in others),
             ]
         stay, others = _settled(
-            field, before, edit, parents, most - sum(len(part) for part, _ in parts), proceed
+            field, before, step, parents, most - sum(len(part) for part, _ in parts), proceed
         )
         parents |= ~stay
         parts += others
@@ -169,7 +167,9 @@ def split_of(
     return split
 
 
-known_splits: WeakKeyDictionary[SplatField, tuple[tuple[Edit, ...], Split | None]] = WeakKeyDictionary()
+known_splits: WeakKeyDictionary[SplatField, tuple[tuple[PreparedEdit, ...], Split | None]] = (
+    WeakKeyDictionary()
+)
 
 
 _Part = tuple[SplatField, NDArray[np.int64]]
@@ -178,8 +178,8 @@ _Part = tuple[SplatField, NDArray[np.int64]]
 
 def _settled(
     field: SplatField,
-    before: EditStack,
-    edit: Edit,
+    before: EditMap,
+    step: PreparedEdit,
     gone: Mask | None,
     room: float,
     proceed: Callable[[], None] | None,
@@ -187,8 +187,8 @@ def _settled(
     """(which splats stay whole [N], children of the others), children split again where they must be."""
     stay, done, found = np.ones(len(field), bool), list[_Part](), field
     sources = np.arange(len(field))
-    for turn in range(CUTS if edit.adjustment == "discrete" else ROUNDS):
-        split = _split_once(found, before, edit, gone if turn == 0 else None, room, proceed)
+    for turn in range(CUTS if isinstance(step.edit, Discrete) else ROUNDS):
+        split = _split_once(found, before, step, gone if turn == 0 else None, room, proceed)
         if split is None:
             break
         if turn == 0:
@@ -221,8 +221,8 @@ class _Children:
 
 def _split_once(
     field: SplatField,
-    before: EditStack,
-    edit: Edit,
+    before: EditMap,
+    step: PreparedEdit,
     gone: Mask | None,
     room: float,
     proceed: Callable[[], None] | None,
@@ -231,18 +231,19 @@ def _split_once(
     moved = moved_splats(field, before, proceed=proceed)
     if gone is not None and gone.any():
         moved = moved.without(gone)
-    rest, elsewhere = _near(edit, field, moved)
+    rest, elsewhere = _near(step, field, moved)
     others = moved.source[elsewhere]
     rows = np.concatenate([rest, others])
     if not len(rows):
         return None
     points = np.concatenate([field.means[rest].astype(np.float64), moved.points[elsewhere]])
     A = np.concatenate([_axes(field, rest), moved.jacobian[elsewhere] @ _axes(field, others)])
-    if edit.adjustment == "discrete":
+    edit = step.edit
+    if isinstance(edit, Discrete):
         children = _cut(edit, field, rows, points, A)
-        if isinstance(edit.patch, SplatPatch):
+        if isinstance(step.patch, SplatPatch):
             whole = np.flatnonzero(~np.isin(rows, children.parent))
-            lit = _shaded(edit, edit.patch, field, rows[whole], points[whole], A[whole])
+            lit = _shaded(edit, step.patch, field, rows[whole], points[whole], A[whole])
             children = _together([children, lit])
     else:
         children = _bent(edit, field, rows, points, A, proceed)
@@ -255,14 +256,17 @@ def _axes(field: SplatField, rows: NDArray[np.int64]) -> Array:
     return np.asarray(turns * np.exp(field.log_scales[rows].astype(np.float64))[:, None, :])
 
 
-def _near(edit: Edit, field: SplatField, moved: MovedSplats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _near(
+    step: PreparedEdit, field: SplatField, moved: MovedSplats
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Which splats in their own places [.], and which of those that moved [.], an edit may have to split."""
     from cagefield.rendering.splats.kernels.deformation import within_reach, within_reach_at_rest
 
-    boxes = np.concatenate([edit.boxes, edit.inner.aabb[None]])
+    boxes = np.concatenate([step.boxes, step.edit.inner.aabb[None]])
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     # Stretches are Frobenius' norms, that of nothing is sqrt(3).
-    least = 0.0 if edit.adjustment == "discrete" else _UNSTRETCHED * SMALL * float(np.linalg.norm(high - low))
+    is_cut = isinstance(step.edit, Discrete)
+    least = 0.0 if is_cut else _UNSTRETCHED * SMALL * float(np.linalg.norm(high - low))
     rest, elsewhere = np.empty(len(field), bool), np.empty(len(moved.source), bool)
     scales = field.log_scales
     within_reach_at_rest(field.means, moved.left, scales, low, high, REACH, least, _UNSTRETCHED, rest)
@@ -340,17 +344,17 @@ def _row(parent: NDArray[np.int64], direction: Array, r: Array, opacity: Array) 
     return _Children(parent[owner], direction[owner], x, r[owner], alpha, across)
 
 
-def _cut(edit: Edit, field: SplatField, rows: NDArray[np.int64], points: Array, A: Array) -> _Children:
+def _cut(edit: Discrete, field: SplatField, rows: NDArray[np.int64], points: Array, A: Array) -> _Children:
     """The splats that faces go through, in two parts each; of a splat that several cut, the deepest cut."""
     best = np.full(len(rows), np.inf)
     t, direction = np.zeros(len(rows)), np.zeros((len(rows), 3))
     # A paste hides nothing; its cage is in another scene, where what is pasted was cut already.
     cuts: list[tuple[Cage, Mask]] = (
-        [] if edit.source is not None else [(edit.inner, np.ones(len(rows), bool))]
+        [] if isinstance(edit, Paste) else [(edit.inner, np.ones(len(rows), bool))]
     )
-    if not edit.deleted and edit.source is None:
+    if not isinstance(edit, Delete | Paste):
         # What lands in the deformed cage hides what stays there, but not what leaves.
-        cuts.append((edit.deformed, ~edit.inner.contains(points) | edit.keep_source))
+        cuts.append((edit.deformed, ~edit.inner.contains(points) | isinstance(edit, Copy)))
     size = np.linalg.norm(A, axis=(1, 2))
     for cage, concerned in cuts:
         for face in FACES:
@@ -379,7 +383,7 @@ def _shaded(
 ) -> _Children:
     """Rows of children for the splats over which the light of a patch changes."""
     # The cage of a paste is in another scene.
-    inside = np.zeros(len(rows), bool) if edit.source is not None else edit.inner.contains(points)
+    inside = np.zeros(len(rows), bool) if isinstance(edit, Paste) else edit.inner.contains(points)
     change = np.zeros((len(rows), 3))
     steps = A.transpose(0, 2, 1)  # [M, axis, 3]
     for light, here in ((patch.light, ~inside), (patch.part, inside)):

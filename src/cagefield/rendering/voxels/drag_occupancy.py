@@ -12,17 +12,17 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.edits import Edit, EditStack
-from cagefield.edits.device.device_stack import DeviceStack
+from cagefield.edits import EditMap, PreparedEdit, PreparedStack
+from cagefield.edits.device_stack import DeviceStack
 from cagefield.rendering.voxels import occupancy_continuous as smooth
 from cagefield.rendering.voxels.device_grid import DeviceGrid
 from cagefield.rendering.voxels.occupancy import Occupancy
 from cagefield.rendering.voxels.occupancy_deformed import deform
 
 
-def replaced(before: EditStack, after: EditStack) -> int | None:
+def replaced(before: EditMap, after: EditMap) -> int | None:
     """The place of the only active edit that differs, where another one's box meets its own; else None."""
-    old, new = before.active, after.active
+    old, new = before.steps, after.steps
     if len(old) != len(new):
         return None
     places = [n for n in range(len(new)) if old[n] != new[n]]
@@ -53,27 +53,27 @@ class Link:
 class Chain:
     """The edits before and after a place, the occupancy below it, and corners taken to it from above."""
 
-    earlier: tuple[Edit, ...]
-    later: tuple[Edit, ...]
+    earlier: tuple[PreparedEdit, ...]
+    later: tuple[PreparedEdit, ...]
     below: Occupancy
     _starts: dict[tuple[int, ...], NDArray[np.float32]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, edits: EditStack, place: int, canonical: Occupancy, grid: DeviceGrid) -> Chain:
+    def of(cls, edits: EditMap, place: int, canonical: Occupancy, grid: DeviceGrid) -> Chain:
         """The chain around a place among the active edits, none of which is discrete."""
-        active = edits.active
-        earlier = DeviceStack.from_stack(EditStack(active[:place]))
+        active = edits.steps
+        earlier = DeviceStack.from_stack(PreparedStack(active[:place]))
         below = deform(canonical, grid, earlier, jumps=False, coarse=True)
         return cls(active[:place], active[place + 1 :], below)
 
-    def fits(self, edits: EditStack, place: int) -> bool:
+    def fits(self, edits: EditMap, place: int) -> bool:
         """True where the other edits are those of the chain."""
-        active = edits.active
+        active = edits.steps
         return self.earlier == active[:place] and self.later == active[place + 1 :]
 
-    def link(self, edit: Edit) -> Link:
+    def link(self, edit: PreparedEdit) -> Link:
         """The chain with this edit at its place."""
-        return Link(self, DeviceStack.from_stack(EditStack([edit])))
+        return Link(self, DeviceStack.from_stack(PreparedStack([edit])))
 
     def starts(
         self, grid: DeviceGrid, lower: NDArray[np.int64], count: NDArray[np.int64]
@@ -84,6 +84,6 @@ class Chain:
         key = (*lower.tolist(), *count.tolist())
         if key not in self._starts:
             self._starts.clear()
-            later = DeviceStack.from_stack(EditStack(self.later))
+            later = DeviceStack.from_stack(PreparedStack(self.later))
             self._starts[key] = smooth.coarse_corners(grid, later, lower, count)
         return self._starts[key]

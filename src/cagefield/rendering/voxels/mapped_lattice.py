@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.devices import ints
-from cagefield.edits.device.device_stack import DeviceStack
+from cagefield.edits.device_stack import DeviceStack
 from cagefield.rendering.voxels.device_grid import DeviceGrid
 from cagefield.rendering.voxels.kernels.mapped_lattice import map_points
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.devices import ints
-from cagefield.edits.device.device_stack import DeviceStack
+from cagefield.edits.device_stack import DeviceStack
 from cagefield.rendering.voxels.device_grid import DeviceGrid, occupancy_args
 from cagefield.rendering.voxels.kernels.occupancy_continuous import dense_blocks, occupied_points
 from cagefield.rendering.voxels.kernels.occupancy_queries import MOST_CELLS

@@ -17,7 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.edits.device.device_stack import DeviceStack
+from cagefield.edits.device_stack import DeviceStack
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.rendering.voxels import occupancy_continuous as smooth
 from cagefield.rendering.voxels import occupancy_discontinuous as jumping

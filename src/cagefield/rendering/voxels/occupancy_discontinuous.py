@@ -20,7 +20,7 @@ from scipy import ndimage
 
 from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.devices import ints
-from cagefield.edits.device.device_stack import DeviceStack
+from cagefield.edits.device_stack import DeviceStack
 from cagefield.rendering.voxels.device_grid import DeviceGrid, occupancy_args
 from cagefield.rendering.voxels.kernels.occupancy_discontinuous import dense_blocks, occupied_corners
 from cagefield.rendering.voxels.occupancy import BRICK, Occupancy, cubes

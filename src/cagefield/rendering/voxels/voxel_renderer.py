@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
 from cagefield.compute.devices import floats, ints
-from cagefield.edits import EditStack
+from cagefield.edits import Discrete, EditMap, EditStack
 from cagefield.errors import CagefieldError
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.images.render_result import Background, RenderResult
@@ -42,7 +42,7 @@ class Renderer:
     def __init__(
         self,
         field: VoxelField,
-        edits: EditStack | None = None,
+        edits: EditMap | None = None,
         *,
         step: float = 0.5,
         preserve_opacity: bool = True,
@@ -54,7 +54,7 @@ class Renderer:
         from cagefield.rendering.voxels.device_grid import DeviceGrid, occupancy_args, to_device
 
         self.field = field
-        self.edits = edits if edits is not None else EditStack([])
+        self.edits: EditMap = edits if edits is not None else EditStack([])
         self.step = float(step)
         self.preserve_opacity = preserve_opacity
         shared = grid if grid is not None else DeviceGrid.from_field(field)
@@ -69,7 +69,7 @@ class Renderer:
 
     def with_edits(
         self,
-        edits: EditStack,
+        edits: EditMap,
         *,
         preserve_opacity: bool | None = None,
         coarse: bool = False,
@@ -95,8 +95,8 @@ class Renderer:
         coarse: bool = False,
         proceed: Callable[[], None] | None = None,
     ) -> None:
-        from cagefield.edits.device.device_stack import DeviceStack
         from cagefield.edits.device.packing import widened
+        from cagefield.edits.device_stack import DeviceStack
         from cagefield.rendering.voxels.device_grid import for_kernels, occupancy_args
         from cagefield.rendering.voxels.drag_occupancy import Chain, replaced
         from cagefield.rendering.voxels.occupancy_deformed import Known, deform
@@ -112,7 +112,7 @@ class Renderer:
             if place is not None:
                 if self._chain is None or not self._chain.fits(self.edits, place):
                     self._chain = Chain.of(self.edits, place, self._canonical, self.grid)
-                link = self._chain.link(self.edits.active[place])
+                link = self._chain.link(self.edits.steps[place])
         self._coarse = coarse
         self.occupancy = deform(self._canonical, self.grid, stack, jumps, known, coarse, proceed, link)
         self._bricks = occupancy_args(self.occupancy, for_kernels(self.occupancy.codes))
@@ -197,9 +197,9 @@ class Renderer:
         return self._pixels[(width, height)]
 
 
-def _jumps(edits: EditStack) -> bool:
+def _jumps(edits: EditMap) -> bool:
     """True where an edit's map is not continuous."""
-    return any(edit.adjustment == "discrete" for edit in edits.active)
+    return any(isinstance(step.edit, Discrete) for step in edits.steps)
 
 
 def _checked_region(region: tuple[int, int, int, int] | None, camera: Camera) -> tuple[int, int, int, int]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.operations import Operation
+from cagefield.edits.shells import SMOOTH_FLOW, Flow
 from cagefield.errors import EditError
 
 COLOURS = ("#4cc2ff", "#ffb14c", "#7ee081", "#ff7eb6", "#c9a7ff", "#f4e04d", "#5ce0d0", "#ff8a66")
@@ -16,11 +17,10 @@ COLOURS = ("#4cc2ff", "#ffb14c", "#7ee081", "#ff7eb6", "#c9a7ff", "#f4e04d", "#5
 
 @dataclass(frozen=True)
 class Spare:
-    """What an edit of another kind cannot have, kept for when the kind is changed back."""
+    """Options that an edit of the present kind cannot have, kept for when the kind is changed back."""
 
     operations: tuple[Operation, ...] = ()
-    falloff: str = "smooth"
-    width: float = 1.0
+    flow: Flow = SMOOTH_FLOW
 
 
 @dataclass(frozen=True)

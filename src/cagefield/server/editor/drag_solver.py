@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
-from cagefield.edits import Edit
+from cagefield.edits import Delete, Edit, Paste
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation, Triple
 from cagefield.edits.safe_fraction import largest_safe
@@ -63,7 +63,7 @@ def move(entry: Entry, target: Target, operation: Operation) -> Moved:
         raise EditError(f'edit "{edit.name}" is locked; unlock it to change it')
     if target == "field":
         return _with_field(edit, operation)
-    if target == "outer" and edit.outer is None:
+    if target == "outer" and edit.shell_settings.outer is None:
         raise EditError(f'edit "{edit.name}" has no outer cage; give it one with "outer margin"')
     return _cages_alone(edit, target, operation)
 
@@ -85,7 +85,7 @@ def _sum(first: Operation, second: Operation) -> Operation | None:
 
 
 def _with_field(edit: Edit, operation: Operation) -> Moved:
-    if edit.deleted:
+    if isinstance(edit, Delete):
         raise EditError(f'edit "{edit.name}" deletes its cage\'s content; choose move or copy to move it')
     try:
         whole = edit.replace(operations=appended(edit.operations, operation))
@@ -118,7 +118,7 @@ def _cages_alone(edit: Edit, target: Target, operation: Operation) -> Moved:
             return False
         return not was_fine or problem(moved) is None
 
-    if edit.source is not None and (refusal := crop_problem(edit, operation)) is not None:
+    if isinstance(edit, Paste) and (refusal := crop_problem(edit, operation)) is not None:
         return Moved(edit, 0.0, refusal)
     part = largest_safe(safe)
     if part >= 1.0:
@@ -131,13 +131,14 @@ def _cages_alone(edit: Edit, target: Target, operation: Operation) -> Moved:
 
 
 def _set_cages(edit: Edit, target: Target, operation: Operation) -> Edit:
-    if edit.source is not None:
+    if isinstance(edit, Paste):
         return crop_paste(edit, operation.apply(edit.deformed))
     inner = edit.inner if target == "outer" else operation.apply(edit.inner)
-    outer = edit.outer
+    settings = edit.shell_settings
+    outer = settings.outer
     if outer is not None and target == "outer":
         outer = operation.apply(outer)
     elif outer is not None and target == "both":
         about = operation.apply(Cage(outer.corners, pivot=edit.inner.pivot))
         outer = Cage(about.corners)
-    return edit.replace(inner=inner, outer=outer)
+    return edit.replace(inner=inner).with_shell_settings(replace(settings, outer=outer))

@@ -1,12 +1,18 @@
-"""The four kinds of an edit as an editor names them, and what changing the options of an edit does to it."""
+"""The four kinds of an edit as an editor names them, and the effect of changed options on an edit.
+
+An option that the new kind of an edit cannot have is kept in the entry's `Spare`, for the way back.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
-from cagefield.edits import Edit
+from cagefield.edits import Continuous, Copy, Delete, Edit, Flow, Move, Paste, shell_kind
+from cagefield.edits.shells import SMOOTH_FLOW, problem_of_unused_falloff
 from cagefield.errors import EditError
+from cagefield.geometry.cage import Cage
 from cagefield.server.editor.cage_placement import OUTER_CAGE_MARGIN_SHARE, outer_cage_around
 from cagefield.server.editor.document import Entry, Spare
 
@@ -14,57 +20,83 @@ Kind: TypeAlias = Literal["continuous", "move", "copy", "delete"]
 
 
 def kind_of(edit: Edit) -> Kind:
-    """What an edit does: "continuous", or discrete "move", "copy" or "delete"."""
-    if edit.adjustment == "continuous":
+    """Kind of an edit; "copy" of a paste."""
+    if isinstance(edit, Continuous):
         return "continuous"
-    if edit.deleted:
+    if isinstance(edit, Delete):
         return "delete"
-    return "copy" if edit.keep_source else "move"
+    return "move" if isinstance(edit, Move) else "copy"
 
 
 def with_kind(entry: Entry, kind: Kind) -> Entry:
-    """The entry with its edit of another kind; what that kind cannot have waits in `spare`."""
-    edit, spare = entry.edit, entry.spare
+    """The entry with its edit of another kind. Raises `EditError` for a paste."""
+    edit = entry.edit
     if kind == kind_of(edit):
         return entry
-    if edit.source is not None:
+    if isinstance(edit, Paste):
         raise EditError(f'edit "{edit.name}" is pasted, and stays a copy; remove it to take it away')
-    kept = Spare(
-        edit.operations or spare.operations,
-        edit.falloff if _fades(edit) else spare.falloff,
-        edit.width if _fades(edit) else spare.width,
-    )
-    changes: dict[str, Any] = {
-        "adjustment": "continuous" if kind == "continuous" else "discrete",
-        "keep_source": kind == "copy",
-        "deleted": kind == "delete",
-        "operations": () if kind == "delete" else kept.operations,
-        "falloff": "smooth",
-        "width": 1.0,
-    }
+    settings, flow = edit.shell_settings, _flow(edit)
+    spare = Spare(edit.operations or entry.spare.operations, flow or entry.spare.flow)
+    shared = edit.shared_options
     if kind == "continuous":
-        if edit.shell == "flow":
-            changes |= {"falloff": kept.falloff, "width": kept.width}
-        if edit.outer is None:
-            changes["outer"] = outer_cage_around(edit, _margin(edit))
-    return replace(entry, edit=edit.replace(**changes), spare=kept)
+        outer = outer_cage_around(edit, _margin(edit)) if settings.outer is None else settings.outer
+        shell = spare.flow if isinstance(settings.shell, Flow) else settings.shell
+        changed: Edit = Continuous(
+            edit.inner,
+            outer,
+            operations=spare.operations,
+            shell=shell,
+            lattice=settings.lattice,
+            allow_folding=settings.allow_folding,
+            **shared,
+        )
+    else:
+        unused = replace(settings, shell=shell_kind(settings.shell.name))
+        if kind == "delete":
+            changed = Delete(edit.inner, unused_shell=unused, **shared)
+        else:
+            discrete = Copy if kind == "copy" else Move
+            changed = discrete(edit.inner, operations=spare.operations, unused_shell=unused, **shared)
+    return replace(entry, edit=changed, spare=spare)
 
 
-def with_shell(entry: Entry, shell: str) -> Entry:
-    """The entry with another shell map; only a continuous flow shell has a falloff and a width."""
-    edit, spare = entry.edit, entry.spare
-    if shell == edit.shell:
+def with_shell(entry: Entry, name: str) -> Entry:
+    """The entry with another shell kind; only a continuous flow shell has a falloff and a width."""
+    edit, settings, flow = entry.edit, entry.edit.shell_settings, _flow(entry.edit)
+    if name == settings.shell.name:
         return entry
-    changes: dict[str, Any] = {"shell": shell, "falloff": "smooth", "width": 1.0}
-    if _fades(edit):
-        spare = replace(spare, falloff=edit.falloff, width=edit.width)
-    elif shell == "flow" and edit.adjustment == "continuous":
-        changes |= {"falloff": spare.falloff, "width": spare.width}
-    return replace(entry, edit=edit.replace(**changes), spare=spare)
+    shell = entry.spare.flow if name == "flow" and isinstance(edit, Continuous) else shell_kind(name)
+    spare = entry.spare if flow is None else replace(entry.spare, flow=flow)
+    return replace(entry, edit=edit.with_shell_settings(replace(settings, shell=shell)), spare=spare)
 
 
-def _fades(edit: Edit) -> bool:
-    return edit.adjustment == "continuous" and edit.shell == "flow"
+def with_outer(edit: Edit, outer: Cage) -> Edit:
+    """The edit with another outer cage; a discrete edit keeps it for when it becomes continuous."""
+    return edit.with_shell_settings(replace(edit.shell_settings, outer=outer))
+
+
+def with_options(edit: Edit, options: Mapping[str, Any]) -> Edit:
+    """The edit with options that a page names changed: falloff, width, lattice, allow_folding, or fields.
+
+    Raises `EditError` for a falloff or a width of an edit without a flow shell.
+    """
+    fields, settings = dict(options), edit.shell_settings
+    falloff = {name: fields.pop(name) for name in ("falloff", "width") if name in fields}
+    shell = {name: fields.pop(name) for name in ("lattice", "allow_folding") if name in fields}
+    if falloff:
+        flow = replace(_flow(edit) or SMOOTH_FLOW, **falloff)
+        owner = f"{settings.shell.name} shell" if isinstance(edit, Continuous) else "discrete edit"
+        problem = None if _flow(edit) else problem_of_unused_falloff(flow, owner)
+        if problem is not None:
+            raise edit.error(problem)
+        settings = replace(settings, shell=flow if _flow(edit) else settings.shell)
+    edit = edit.with_shell_settings(replace(settings, **shell))
+    return edit.replace(**fields)
+
+
+def _flow(edit: Edit) -> Flow | None:
+    """Flow shell of a continuous edit; None of any other."""
+    return edit.shell if isinstance(edit, Continuous) and isinstance(edit.shell, Flow) else None
 
 
 def _margin(edit: Edit) -> float:

@@ -7,6 +7,8 @@ F the reflection; in the mirrored cage's own axes F has the same signs, so `axes
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -19,9 +21,11 @@ from cagefield.typing import Array
 
 def mirror_edit(edit: Edit, axis: int, at: float) -> Edit:
     """The edit across the plane where coordinate `axis` is `at`."""
-    return edit.replace(
+    settings = edit.shell_settings
+    if settings.outer is not None:
+        settings = replace(settings, outer=mirrored_cage(settings.outer, axis, at))
+    return edit.with_shell_settings(settings).replace(
         inner=mirrored_cage(edit.inner, axis, at),
-        outer=None if edit.outer is None else mirrored_cage(edit.outer, axis, at),
         operations=tuple(mirrored_operation(operation, axis) for operation in edit.operations),
     )
 

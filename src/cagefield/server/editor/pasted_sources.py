@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, Paste
 from cagefield.edits.paste_paths import relative, resolved
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.field_files import read_field_kind
@@ -26,14 +26,14 @@ DEEP, MOST, LOOKED_AT = 3, 200, 5000
 
 def absolute(edits: Iterable[Edit], folder: Path) -> list[Edit]:
     """The edits with absolute sources; relative ones are relative to a folder."""
-    return [e if e.source is None else e.replace(source=str(resolved(e.source, folder))) for e in edits]
+    return [e.replace(source=str(resolved(e.source, folder))) if isinstance(e, Paste) else e for e in edits]
 
 
 def written(edits: Iterable[Edit], folder: Path, root: Path) -> EditStack:
     """The edits as a file in a folder has them."""
     return EditStack(
         edit.replace(source=relative(Path(edit.source), folder))
-        if edit.source is not None and Path(edit.source).is_relative_to(root)
+        if isinstance(edit, Paste) and Path(edit.source).is_relative_to(root)
         else edit
         for edit in edits
     )
@@ -41,7 +41,7 @@ def written(edits: Iterable[Edit], folder: Path, root: Path) -> EditStack:
 
 def admitted(edit: Edit, folder: Path, root: Path) -> Edit:
     """An edit that a page brings, its source absolute. Raises SceneError for a source outside the root."""
-    if edit.source is None:
+    if not isinstance(edit, Paste):
         return edit
     return edit.replace(source=str(source_in(edit.source, folder, root)))
 
@@ -62,7 +62,7 @@ def source_in(source: str, folder: Path, root: Path) -> Path:
 
 def source_problem(edit: Edit) -> str | None:
     """Why the scene of an edit cannot be had, or None."""
-    if edit.source is None or Path(edit.source).exists():
+    if not isinstance(edit, Paste) or Path(edit.source).exists():
         return None
     return f"what it pastes is gone: {edit.source}; put it back, or remove the edit"
 

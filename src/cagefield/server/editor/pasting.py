@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.edits import Edit
+from cagefield.edits import Edit, Paste
 from cagefield.edits.operations import Operation
 from cagefield.edits.paste_placement import placed_paste
 from cagefield.errors import CageError, EditError
@@ -21,7 +21,7 @@ TURNED = "the cage of a paste shrinks, grows and moves in Set mode; turn it in E
 
 def build_paste(
     source: str, name: str, box: Array, source_up: Array, at: Array, up: Array, view_height: float
-) -> Edit:
+) -> Paste:
     """The paste of a whole scene, whose box [2,3] and up direction are given, upright on a point [3]."""
     size = PASTE_VIEW_SHARE * view_height
     return placed_paste(source, box, at, up=up, source_up=source_up, size=size, name=name)
@@ -29,10 +29,10 @@ def build_paste(
 
 def cage_in_scene(edit: Edit) -> Cage:
     """The cage that Set mode shows and moves: of a paste, where it stands."""
-    return edit.inner if edit.source is None else edit.deformed
+    return edit.deformed if isinstance(edit, Paste) else edit.inner
 
 
-def crop_paste(edit: Edit, cage: Cage) -> Edit:
+def crop_paste(edit: Paste, cage: Cage) -> Paste:
     """The paste with another cage, given where it stands, around content that stays where it is.
 
     Raises EditError where its operations do not allow that.
@@ -48,7 +48,7 @@ def crop_paste(edit: Edit, cage: Cage) -> Edit:
     return there
 
 
-def crop_problem(edit: Edit, operation: Operation) -> str | None:
+def crop_problem(edit: Paste, operation: Operation) -> str | None:
     """Why an operation of Set mode cannot be done to a paste's cage, not even a little of it; or None."""
     try:
         crop_paste(edit, operation.part(0.01).apply(edit.deformed))

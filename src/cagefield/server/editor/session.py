@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from cagefield.cameras.keyframes import Keyframe, Timeline
-from cagefield.edits import Edit
+from cagefield.edits import Continuous, Edit, Paste
 from cagefield.edits.edit_files import MOST_EDITS
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattices
@@ -21,7 +21,7 @@ from cagefield.server.editor.active_drags import Drags
 from cagefield.server.editor.cage_placement import cage_pair_around, outer_cage_around
 from cagefield.server.editor.document import Document, Entry
 from cagefield.server.editor.drag_solver import Moved, Target, move
-from cagefield.server.editor.edit_kinds import Kind, with_kind, with_shell
+from cagefield.server.editor.edit_kinds import Kind, with_kind, with_options, with_outer, with_shell
 from cagefield.server.editor.edit_texts import ReadEdits, edits_in
 from cagefield.server.editor.history import History
 from cagefield.server.editor.identity_cache import IdentityCache
@@ -192,17 +192,20 @@ class Session:
     def set_cage(self, number: int, which: str, cage: Cage) -> None:
         """The "inner" or "outer" cage by its corners; the field does not move."""
         entry = self._unlocked(number)
-        pasted = entry.edit.source is not None and which == "inner"
-        edit = crop_paste(entry.edit, cage) if pasted else entry.edit.replace(**{which: cage})
+        edit = entry.edit
+        if which == "outer":
+            edit = with_outer(edit, cage)
+        else:
+            edit = crop_paste(edit, cage) if isinstance(edit, Paste) else edit.replace(inner=cage)
         self._put(f"Set {which} cage{of(entry)}", replace(entry, edit=edit))
 
     def place(self, point: Array, view_height: float) -> int:
         """The number of a new continuous edit, selected, its cages around a point [3] of a surface."""
         inner, outer = cage_pair_around(point, view_height, self.bounds, self.voxel)
-        edit = Edit(inner, outer, name=fresh_name(self.document, "edit"), lattice=LATTICE)
+        edit = Edit.continuous(inner, outer, name=fresh_name(self.document, "edit"), lattice=LATTICE)
         return self._add("Place cages", edit)
 
-    def paste(self, edit: Edit) -> int:
+    def paste(self, edit: Paste) -> int:
         """The number of a new edit that pastes from another scene, selected."""
         edit = edit.replace(name=fresh_name(self.document, edit.name or "paste"))
         return self._add("Paste from another scene", edit)
@@ -210,7 +213,7 @@ class Session:
     def fit_inner(self, number: int, inner: Cage) -> None:
         """The inner cage as it was fitted to its content."""
         entry = self._unlocked(number)
-        if entry.edit.source is not None:
+        if isinstance(entry.edit, Paste):
             inner = Cage(inner.corners, pivot=entry.edit.inner.pivot)
         self._put(f"Fit inner cage{of(entry)}", replace(entry, edit=entry.edit.replace(inner=inner)))
 
@@ -218,7 +221,7 @@ class Session:
         """The outer cage as a margin around all that the inner cage is and was."""
         entry = self._unlocked(number)
         outer = outer_cage_around(entry.edit, margin)
-        self._put(f"Outer margin{of(entry)}", replace(entry, edit=entry.edit.replace(outer=outer)))
+        self._put(f"Outer margin{of(entry)}", replace(entry, edit=with_outer(entry.edit, outer)))
 
     # ---- options and the list ----
 
@@ -241,7 +244,7 @@ class Session:
             raise EditError(f'edit "{entry.edit.name}" is locked; unlock it to change it')
         entry = entry if kind is None else with_kind(entry, kind)
         entry = entry if shell is None else with_shell(entry, shell)
-        entry = replace(entry, edit=entry.edit.replace(**options))
+        entry = replace(entry, edit=with_options(entry.edit, options))
         words = [
             word for word, value in (("kind", kind), ("shell", shell), ("lock", locked)) if value is not None
         ]
@@ -272,7 +275,7 @@ class Session:
     def mirror(self, number: int, axis: int) -> int:
         """The number of a mirrored copy of an edit, across the plane through the field's middle."""
         entry = self.document.entry(number)
-        if entry.edit.source is not None:
+        if isinstance(entry.edit, Paste):
             raise EditError(f'edit "{entry.edit.name}" is pasted; what is pasted cannot be mirrored')
         edit = mirror_edit(entry.edit, axis, float(self.bounds[:, axis].mean()))
         edit = edit.replace(name=fresh_name(self.document, entry.edit.name or "edit"))
@@ -389,7 +392,7 @@ class Session:
 
     def _push(self, name: str, document: Document) -> None:
         shown = (entry.edit for entry in document.entries if entry.edit.enabled)
-        too_large = problem_of_lattices(e.lattice for e in shown if e.adjustment == "continuous")
+        too_large = problem_of_lattices(edit.lattice for edit in shown if isinstance(edit, Continuous))
         if too_large is not None:
             raise EditError(too_large)
         self.preview = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cagefield.edits import Edit
+from cagefield.edits import Continuous, Edit, Trilinear
 
 OUTSIDE_MESSAGE = "the inner cage must stay inside the outer cage; enlarge the outer cage (Set mode)"
 FOLDED = "the space between the cages would fold; enlarge the outer cage (Set mode), or choose the flow shell"
@@ -14,10 +14,12 @@ def problem(edit: Edit) -> str | None:
     """Why an edit cannot be shown, in a sentence with its cure, or None."""
     if edit.is_possible:
         return None
+    if not isinstance(edit, Continuous):
+        return None
     outer = edit.outer
-    if outer is not None and not outer.contains([*edit.inner.corners, *edit.deformed.corners]).all():
+    if not outer.contains([*edit.inner.corners, *edit.deformed.corners]).all():
         return OUTSIDE_MESSAGE
-    return FOLDED if edit.shell == "trilinear" else CLOSE
+    return FOLDED if isinstance(edit.shell, Trilinear) else CLOSE
 
 
 def cause(reason: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Keyframe, Timeline
+from cagefield.edits import Flow, Paste
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import CastShadow
@@ -90,7 +91,8 @@ def edit_state(
     entry: Entry, problem: str | None, error: tuple[float, float] | None
 ) -> server_messages.EditState:
     """One edit as pages show it; `error` is its lattice's, in voxels."""
-    edit = entry.edit
+    edit, settings = entry.edit, entry.edit.shell_settings
+    flow = settings.shell if isinstance(settings.shell, Flow) else Flow()
     return server_messages.EditState(
         id=entry.id,
         name=edit.name,
@@ -98,20 +100,20 @@ def edit_state(
         enabled=edit.enabled,
         locked=entry.locked,
         kind=kind_of(edit),
-        source=edit.source,
-        shell=cast(Any, edit.shell),
-        falloff=cast(Any, edit.falloff),
-        width=edit.width,
+        source=edit.source if isinstance(edit, Paste) else None,
+        shell=cast(Any, settings.shell.name),
+        falloff=cast(Any, flow.falloff),
+        width=flow.width,
         fill="none" if edit.fill == "none" else "surroundings",
         relight="shadow" if isinstance(edit.relight, CastShadow) else edit.relight,
-        lattice=edit.lattice or 0,
+        lattice=settings.lattice or 0,
         lattice_error=error,
         inner=corners(cage_in_scene(edit)),
         deformed=corners(edit.deformed),
-        outer=None if edit.outer is None else corners(edit.outer),
+        outer=None if settings.outer is None else corners(settings.outer),
         pivot=vec3(edit.deformed.pivot),
         inner_pivot=vec3(cage_in_scene(edit).pivot),
-        outer_pivot=None if edit.outer is None else vec3(edit.outer.pivot),
+        outer_pivot=None if settings.outer is None else vec3(settings.outer.pivot),
         operations=[f"{operation.noun} {operation}" for operation in edit.operations],
         problem=problem,
     )
@@ -150,7 +152,7 @@ def state_of(
 
 def dragged_of(drag: int, seq: int, moved: Moved) -> server_messages.Dragged:
     """Message with the result of a drag."""
-    edit = moved.edit
+    edit, outer = moved.edit, moved.edit.shell_settings.outer
     return server_messages.Dragged(
         drag=drag,
         seq=seq,
@@ -158,7 +160,7 @@ def dragged_of(drag: int, seq: int, moved: Moved) -> server_messages.Dragged:
         why=moved.why,
         inner=corners(cage_in_scene(edit)),
         deformed=corners(edit.deformed),
-        outer=None if edit.outer is None else corners(edit.outer),
+        outer=None if outer is None else corners(outer),
     )
 
 

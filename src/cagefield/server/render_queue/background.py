@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from cagefield.edits import Edit
+from cagefield.edits import Continuous, Edit
 from cagefield.errors import CagefieldError
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.editor.persistence import SceneStore
@@ -19,6 +19,7 @@ from cagefield.server.render_queue.jobs import Job
 from cagefield.server.render_queue.splat_downloads import Exports
 from cagefield.server.render_worker.tasks import (
     Answered,
+    EditValues,
     EndJobTask,
     ErrorTask,
     Failed,
@@ -26,7 +27,6 @@ from cagefield.server.render_worker.tasks import (
     Stopped,
     WarmStage,
     WarmTask,
-    values_of,
 )
 
 Errors = tuple[float, float]
@@ -93,11 +93,11 @@ class BackgroundWork:
     def _unmeasured(self) -> Edit | None:
         if self._session.moving:
             return None
-        edits = (edit for edit in self._session.drawn() if edit.lattice and edit.adjustment == "continuous")
+        edits = (edit for edit in self._session.drawn() if isinstance(edit, Continuous) and edit.lattice)
         return next((edit for edit in edits if edit not in self._errors), None)
 
     def _measure(self, edit: Edit, generation: int) -> BackgroundTask:
-        values = values_of((edit,))[0]
+        values = EditValues.from_edit(edit)
 
         def done(result: Result) -> None:
             if isinstance(result, Stopped):

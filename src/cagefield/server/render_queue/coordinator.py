@@ -282,7 +282,8 @@ class Coordinator:
         if opacity != other:
             return WHOLE
         beside = np.array([[-self.spread], [self.spread]])
-        return screen_bounds(camera, after.changed_boxes(before, self._patches.boxes) + beside)
+        changed = after.changed_boxes(before, lambda step: self._patches.boxes(step.edit))
+        return screen_bounds(camera, changed + beside)
 
     def deliver(self, request: Request, stamp: Stamp, done: PictureDone) -> None:
         """A picture for a page."""

@@ -11,7 +11,7 @@ from cagefield.completion.lighting.ambient_occlusion import RADII_DIAGONALS, occ
 from cagefield.completion.patcher import needs_patch, needs_relighting
 from cagefield.completion.surfaces.patch_bounds import ANY_SHADOW_DIRECTIONS, NO_SHADOW_DIRECTIONS, patch_box
 from cagefield.completion.surfaces.splat_voxelization import max_voxel_size
-from cagefield.edits import Edit
+from cagefield.edits import Continuous, Edit
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.typing import Array
@@ -45,6 +45,6 @@ class PatchExtent:
 def _box(edit: Edit, voxel: float, reach: float) -> Array:
     # Where the light comes from is found out elsewhere.
     falls = NO_SHADOW_DIRECTIONS if edit.relight in ("occlusion", "none") else ANY_SHADOW_DIRECTIONS
-    if edit.adjustment == "continuous":
+    if isinstance(edit, Continuous):
         return light_box(edit, voxel, reach, falls)
     return patch_box(edit, voxel, reach, shadow_directions=falls)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.files.temporary_folders import TemporaryFolder
@@ -131,7 +131,7 @@ def write_edited(scene: str, edits: tuple[EditValues, ...], preserve_opacity: bo
     from cagefield.scene.scene import Scene
 
     opened = Scene.open(scene)
-    stack = EditStack(Edit(**values) for values in edits)
+    stack = EditStack(values.edit() for values in edits)
     splats = edited_splats(dataclasses.replace(opened, edits=stack, preserve_opacity=preserve_opacity))
     Path(out).parent.mkdir(parents=True, exist_ok=True)
     write_splats(upright(splats, opened.up), out)

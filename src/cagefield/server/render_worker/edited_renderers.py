@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cagefield.edits import Edit
+from cagefield.edits import Continuous, Edit
 from cagefield.server.editor.identity_cache import IdentityCache
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class EditedRenderers:
 
     def _quickly(self, edit: Edit) -> Edit:
         """The edit with a coarser lattice, kept as long as the edit is."""
-        if edit.adjustment != "continuous" or (edit.lattice or 512) <= QUICK_LATTICE:
+        if not isinstance(edit, Continuous) or (edit.lattice or 512) <= QUICK_LATTICE:
             return edit
         if edit in self._coarse:
             return self._coarse[edit]

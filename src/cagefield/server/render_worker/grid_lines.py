@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Continuous, Edit, EditStack
 from cagefield.typing import Array
 
 LINES_PER_AXIS = 7
@@ -28,9 +28,9 @@ MAX_ITERATIONS = 30
 
 def grid_lines(edit: Edit) -> list[list[list[float]]]:
     """Polylines, world units, in deformed space. Raises EditError where the edit cannot be evaluated."""
-    from cagefield.edits.device.device_stack import DeviceStack
+    from cagefield.edits.device_stack import DeviceStack
 
-    if edit.outer is None or edit.adjustment != "continuous":
+    if not isinstance(edit, Continuous):
         return []
     origin, frame = edit.outer.frame
     stack = DeviceStack.from_stack(EditStack([edit.replace(lattice=LATTICE_NODES)]))

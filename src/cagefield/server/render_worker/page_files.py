@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from cagefield.edits import Edit
+from cagefield.edits import Edit, Paste
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
@@ -83,7 +83,7 @@ class PageFiles:
 
         Raises CagefieldError for pastes, whose colours a page that has loaded its splats does not have.
         """
-        if any(edit.source is not None for edit in shown):
+        if any(isinstance(edit, Paste) for edit in shown):
             raise CagefieldError("the server draws what is pasted between scenes of splats")
         began, proceed = time.perf_counter(), cancellation_check(stop)
         try:

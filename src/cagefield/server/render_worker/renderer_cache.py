@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cagefield.cameras.camera import Camera
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Continuous, Edit, EditStack
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
@@ -122,7 +122,7 @@ class RendererCache:
             return
         voxel = self.scene.field.sample_spacing
         inner = Cage.box(self._middle, 8.0 * voxel)
-        edit = Edit(inner, inner.grown(8.0 * voxel), lattice=8).translate((2.0 * voxel, 0.0, 0.0))
+        edit = Edit.continuous(inner, inner.grown(8.0 * voxel), lattice=8).translate((2.0 * voxel, 0.0, 0.0))
         size = float(np.linalg.norm(self._middle)) + 4.0 * self._radius
         camera = Camera.look_at(
             self._middle + size * np.array([1.0, 0.0, 0.3]), self._middle, width=8, height=8, fov_x=0.5
@@ -148,8 +148,8 @@ class RendererCache:
         Those shown last are kept, as far as `KEPT_EDITS` and `KEPT_BYTES` allow.
         """
         found = []
-        for fields in values:
-            edit = Edit(**fields)
+        for each in values:
+            edit = each.edit()
             found.append(next((known for known in self._edits if known == edit), edit))
         others = [known for known in self._edits if not any(known is edit for edit in found)]
         sizes = itertools.accumulate(_lattice_bytes(edit) for edit in others)
@@ -204,7 +204,7 @@ class RendererCache:
 
 def _lattice_bytes(edit: Edit) -> int:
     """Bytes of the lattice of an edit, whether it has been made or not."""
-    return 12 * (edit.lattice or 0) ** 3 if edit.adjustment == "continuous" else 0
+    return 12 * (edit.lattice or 0) ** 3 if isinstance(edit, Continuous) else 0
 
 
 def _warm_splats(stage: WarmStage) -> None:
@@ -219,7 +219,7 @@ def _warm_splats(stage: WarmStage) -> None:
         np.zeros((count, 1, 3), np.float32),
     )
     inner = Cage.box((0.0, 0.0, 0.0), 0.5)
-    turned = Edit(inner, inner.grown(0.4)).rotate((0.0, 0.0, 0.3))
+    turned = Edit.continuous(inner, inner.grown(0.4)).rotate((0.0, 0.0, 0.3))
     edits = EditStack() if stage is WarmStage.PICTURE else EditStack([turned, turned, Edit.delete(inner)])
     renderer = renderer_of(field).with_edits(edits, coarse=stage is WarmStage.COARSE_EDIT)
     camera = Camera.look_at((4.0, 0.0, 1.0), (0.0, 0.0, 0.0), width=32, height=32, fov_x=0.5)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cagefield.edits import Edit
+from cagefield.edits import Continuous, EditMap
 from cagefield.fields.splat_field import SplatField
 from cagefield.rendering.splats.raster_splats import deformed_splats
 from cagefield.server.editor.cage_placement import probes
@@ -89,7 +89,7 @@ class TaskHandlers:
             return self._files.end(task.job, task.keep)
         if isinstance(task, PageFieldTask):
             return self._pages.field()
-        return grid_lines(Edit(**task.edit))
+        return grid_lines(task.edit.edit())
 
     def _error(self, task: ErrorTask, stop: Callable[[], bool]) -> Result:
         """(max, mean) error of an edit's lattice, voxels; none for splats, which take no lattice."""
@@ -97,6 +97,8 @@ class TaskHandlers:
             return Answered(task.number, (0.0, 0.0))
         try:
             (edit,) = self._renderers.edits((task.edit,))
+            if not isinstance(edit, Continuous):
+                return Answered(task.number, (0.0, 0.0))
             most, mean = edit.lattice_error(samples=SAMPLES, proceed=cancellation_check(stop))
         except GivenUpError:
             return Stopped(task.number)
@@ -137,6 +139,7 @@ class TaskHandlers:
     def _fit(self, task: FitTask) -> list[bool]:
         """Which of the cage's `probes` are dense."""
         field = self._renderers.scene.field
+        edits: EditMap
         if task.source is not None:
             content = self._renderers.scene.sources.read(task.source)
             field, edits = content.field, content.edits

@@ -23,12 +23,26 @@ class WarmStage(Enum):
     DELETION = "deletion"
 
 
-EditValues: TypeAlias = Mapping[str, Any]
+@dataclass(frozen=True)
+class EditValues:
+    """Kind and fields of an edit, without the results that the edit caches."""
+
+    kind: type[Edit]
+    fields: Mapping[str, Any]
+
+    @classmethod
+    def from_edit(cls, edit: Edit) -> EditValues:
+        """Values of an edit."""
+        return cls(type(edit), {each.name: getattr(edit, each.name) for each in fields(edit)})
+
+    def edit(self) -> Edit:
+        """Edit of these values."""
+        return self.kind(**self.fields)
 
 
 def values_of(edits: tuple[Edit, ...]) -> tuple[EditValues, ...]:
-    """Field values of edits, without their cached properties."""
-    return tuple({f.name: getattr(edit, f.name) for f in fields(edit)} for edit in edits)
+    """Values of edits, which a task carries to the rendering process."""
+    return tuple(EditValues.from_edit(edit) for edit in edits)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cagefield.edits import EditStack, dump_edits
+from cagefield.edits import Continuous, EditStack, Paste, dump_edits
 from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage
 from cagefield.server.editor.cage_placement import fit_to_content
@@ -26,7 +26,15 @@ from cagefield.server.protocol.conversion import (
     view_height,
 )
 from cagefield.server.render_queue.coordinator import Coordinator, Page
-from cagefield.server.render_worker.tasks import FitTask, GridTask, LookTask, Shown, SurfaceTask, values_of
+from cagefield.server.render_worker.tasks import (
+    EditValues,
+    FitTask,
+    GridTask,
+    LookTask,
+    Shown,
+    SurfaceTask,
+    values_of,
+)
 from cagefield.server.render_worker.view import Display
 from cagefield.server.web.worker_threads import run_in_thread
 from cagefield.typing import Array
@@ -138,9 +146,9 @@ class MessageHandlers:
         if number is None:
             raise CagefieldError("choose an edit to show the grid of")
         edit = self._session.shown.entry(number).edit
-        if edit.adjustment != "continuous" or self._session.problem(edit) is not None:
+        if not isinstance(edit, Continuous) or self._session.problem(edit) is not None:
             return []
-        values = values_of((edit,))[0]
+        values = EditValues.from_edit(edit)
         return await self._coordinator.ask(lambda task: GridTask(task, values))
 
     async def _surface(self, x: float, y: float) -> Any:
@@ -261,7 +269,8 @@ class MessageHandlers:
         edit = self._session.document.entry(message.edit).edit
         cage: Cage = edit.inner
         below = Shown(values_of(self._session.below(message.edit)))
-        dense = await self._coordinator.ask(lambda number: FitTask(number, below, cage, edit.source))
+        source = edit.source if isinstance(edit, Paste) else None
+        dense = await self._coordinator.ask(lambda number: FitTask(number, below, cage, source))
         if self._session.document.entry(message.edit).edit.inner == cage:
             self._session.fit_inner(message.edit, fit_to_content(cage, np.array(dense)))
         self._coordinator.changed()

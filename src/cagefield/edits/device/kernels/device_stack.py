@@ -1,4 +1,4 @@
-"""The kernels of `cagefield.edits.device.device_stack`."""
+"""The kernels of `cagefield.edits.device_stack`."""
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +11,7 @@ from numpy.typing import NDArray
 from cagefield.compute import devices
 from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.identity_memo import memoized_by_identity
-from cagefield.edits.device.buffer_pool import BufferPool
-from cagefield.edits.device.edit_lattice import nodes_of
+from cagefield.edits.buffer_pool import BufferPool
 from cagefield.edits.device.kernels.device_stack import map_samples
 from cagefield.edits.device.kernels.edit_maps import EditArgs
 from cagefield.edits.device.packing import (
@@ -30,25 +27,16 @@ from cagefield.edits.device.packing import (
     RESOLUTION,
     UNDER,
     WIDTH,
-    PackedEdit,
-    row_of,
+    pack_warp,
     widened,
 )
+from cagefield.edits.edit import Continuous, Edit, Paste
+from cagefield.edits.edit_map import EditMap
+from cagefield.edits.prepared import PreparedEdit
 from cagefield.warps import flow_table
-from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.flow_shell import FlowShell
 
 _pool = BufferPool()
-
-
-class PackedStack(Protocol):
-    """What of an edit stack is packed."""
-
-    @property
-    def active(self) -> Sequence[PackedEdit]: ...
-
-    @property
-    def places(self) -> Sequence[int]: ...
 
 
 @dataclass(frozen=True)
@@ -66,19 +54,19 @@ class DeviceStack:
     boxes: NDArray[np.float32]
 
     @classmethod
-    def from_stack(cls, stack: PackedStack) -> DeviceStack:
+    def from_stack(cls, stack: EditMap) -> DeviceStack:
         """The stack's enabled edits that change something. Raises `EditError` where one cannot be evaluated.
 
         Lattices are sampled here, by the kernel, and kept for as long as their edit lives.
         """
-        edits = stack.active
-        params = np.zeros((max(len(edits), 1), WIDTH), dtype=np.float32)
+        steps = stack.steps
+        params = np.zeros((max(len(steps), 1), WIDTH), dtype=np.float32)
         lattices: list[NDArray[np.float32]] = []
         offset = 0
-        for number, edit in enumerate(edits):
+        for number, step in enumerate(steps):
             row = params[number]
-            row[:] = row_of(edit)
-            nodes = nodes_of(edit) if row[RESOLUTION] > 0.0 else _flow_table(edit)
+            row[:] = _row_of(step)
+            nodes = _nodes_of(step.edit)
             if len(nodes):
                 row[OFFSET], row[OFFSET + 1] = divmod(offset, 65536)
                 offset += len(nodes)
@@ -87,14 +75,14 @@ class DeviceStack:
         if lattices:
             nodes = lattices[0] if len(lattices) == 1 else _pool.join(lattices)
         places = iter(stack.places)
-        for number, edit in enumerate(edits):
-            for column, layer in ((UNDER, edit.under), (PART, edit.part)):
+        for number, step in enumerate(steps):
+            for column, layer in ((UNDER, step.under), (PART, step.part)):
                 if layer is not None:
                     params[number, column] = next(places)
-        for number in range(len(edits)):
+        for number in range(len(steps)):
             params[number, ALONE] = not _meets(params[:number], params[number])
-        boxes = widened(np.concatenate([np.zeros((0, 2, 3))] + [edit.boxes for edit in edits]))
-        packed = cls(params, nodes, len(edits), boxes.astype(np.float32))
+        boxes = widened(np.concatenate([np.zeros((0, 2, 3))] + [step.boxes for step in steps]))
+        packed = cls(params, nodes, len(steps), boxes.astype(np.float32))
         for array in (packed.params, packed.lattice, packed.boxes):
             array.setflags(write=False)
         return packed
@@ -122,13 +110,41 @@ class DeviceStack:
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7].astype(np.int32)
 
 
+def _row_of(step: PreparedEdit) -> NDArray[np.float32]:
+    """The row of an edit, see `packing.pack_warp`. Raises `EditError` where the edit cannot be evaluated."""
+    return _row_of_edit(step.edit) if step.is_bare else _row_of_step(step)
+
+
 @memoized_by_identity
-def _flow_table(edit: PackedEdit) -> NDArray[np.float32]:
-    """The table [T,3] of an exact flow shell, see `flow_table`; [0,3] for all other edits."""
-    warp = edit.exact_warp
-    if isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell):
-        return flow_table.table(warp.shell)
-    return np.zeros((0, 3), dtype=np.float32)
+def _row_of_edit(edit: Edit) -> NDArray[np.float32]:
+    return _packed(PreparedEdit(edit))
+
+
+@memoized_by_identity
+def _row_of_step(step: PreparedEdit) -> NDArray[np.float32]:
+    return _packed(step)
+
+
+def _packed(step: PreparedEdit) -> NDArray[np.float32]:
+    edit = step.edit
+    if isinstance(edit, Paste) and step.part is None:
+        raise edit.unread()
+    lattice = edit.lattice if isinstance(edit, Continuous) else None
+    return pack_warp(step.exact_warp, step.boxes, lattice)
+
+
+def _nodes_of(edit: Edit) -> NDArray[np.float32]:
+    """Nodes [R^3,3] of an edit's lattice, or the table [T,3] of its exact flow shell; [0,3] without."""
+    if not isinstance(edit, Continuous):
+        return np.zeros((0, 3), dtype=np.float32)
+    return _flow_table(edit) if edit.lattice is None else edit.lattice_nodes
+
+
+@memoized_by_identity
+def _flow_table(edit: Continuous) -> NDArray[np.float32]:
+    """The table [T,3] of an exact flow shell, see `flow_table`; [0,3] of another shell."""
+    shell = edit.exact_warp.shell
+    return flow_table.table(shell) if isinstance(shell, FlowShell) else np.zeros((0, 3), dtype=np.float32)
 
 
 def _meets(others: NDArray[np.float32], row: NDArray[np.float32]) -> bool:
