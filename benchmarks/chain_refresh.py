@@ -20,7 +20,7 @@ from benchmarks.common.tables import Table, number, write_text
 from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
 from cagefield.geometry.cage import Cage
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.scene.scene import Scene
 
 WARM_UP = 3
@@ -37,7 +37,7 @@ def main() -> None:
     parser.add_argument("-o", "--out", type=Path, help="file for the table")
     args = parser.parse_args()
     devices.start("cpu")
-    renderer = Renderer(Scene.open(args.scene).field)
+    renderer = VoxelRenderer(Scene.open(args.scene).field)
     rows = []
     for name, coarse, lattice in (("dragging, lattice 32", True, 32), ("at rest, lattice 64", False, 64)):
         alone, of_ten = (1e3 * seconds for seconds in measured(renderer, coarse, lattice, args.rounds))
@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def measured(
-    renderer: Renderer, coarse: bool, lattice: int, rounds: int
+    renderer: VoxelRenderer, coarse: bool, lattice: int, rounds: int
 ) -> tuple[np.ndarray[tuple[int], np.dtype[np.float64]], np.ndarray[tuple[int], np.dtype[np.float64]]]:
     """Seconds [rounds] of each refresh of the edit alone, and of the chain."""
     chain = edits(renderer, lattice)
@@ -78,7 +78,7 @@ def measured(
     return seconds[0, WARM_UP:], seconds[1, WARM_UP:]
 
 
-def edits(renderer: Renderer, lattice: int) -> list[Edit]:
+def edits(renderer: VoxelRenderer, lattice: int) -> list[Edit]:
     """Ten edits about the middle of the field, in one outer cage of two thirds of it."""
     rng = np.random.default_rng(0)
     lower, upper = renderer.field.bounds

@@ -32,7 +32,7 @@ from cagefield.geometry.cage import Cage
 from cagefield.procedural import procedural_scene
 from cagefield.rendering.renderers import renderer_of
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.training.voxels.voxel_config import VoxelConfig
 from cagefield.typing import AnyArray
@@ -200,7 +200,7 @@ def _row(
     return row
 
 
-def _shown(renderer: Renderer | SplatRenderer, camera: Camera, finer: int) -> AnyArray:
+def _shown(renderer: VoxelRenderer | SplatRenderer, camera: Camera, finer: int) -> AnyArray:
     """A picture over white of 8 bits, drawn with `finer` x `finer` pixels for each."""
     rgb = supersampled(lambda large: renderer.render(large, background="white").rgb, camera, finer)
     return np.round(rgb * 255.0).astype(np.uint8)

@@ -34,7 +34,7 @@ from cagefield.pages.page_edits import MAGIC, VERSION, encode_page_edits, for_pa
 from cagefield.pages.page_field import encode_page_field
 from cagefield.pages.page_file import unpack
 from cagefield.rendering.voxels.occupancy import of_field
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.scene.scene import Scene
 from field_page import FieldPage, field_page
 
@@ -118,7 +118,7 @@ class PagePictures:
 
     def _rows(self, name: str, scene: Scene, page: FieldPage) -> Iterator[str]:
         field = scene.field
-        base = Renderer(field)
+        base = VoxelRenderer(field)
         camera = scene.cameras["test"][0].resized(self.width, self.width * 3 // 4)
         camera = Camera(camera.c2w, camera.width, camera.height, camera.fx, camera.fx, camera.cx, camera.cy)
         for edit in ("", *EDITS[name]):
@@ -200,7 +200,7 @@ def uploaded(data: bytes) -> int:
     return sum(array.nbytes for array in unpack(data, MAGIC, VERSION, "edits for pages")[1].values())
 
 
-def lattice_error(renderer: Renderer, voxel: float) -> str:
+def lattice_error(renderer: VoxelRenderer, voxel: float) -> str:
     """Largest and mean distance, in voxels, that halves move the nodes of a renderer's lattices."""
     nodes = renderer._stack.lattice
     if len(nodes) < 2:

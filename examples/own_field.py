@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from cagefield import Cage, Edit, EditStack, Renderer, bake, render_sampled, turntable
+from cagefield import Cage, Edit, EditStack, VoxelRenderer, bake, render_sampled, turntable
 
 
 class Torus(torch.nn.Module):
@@ -49,7 +49,7 @@ def main(path):
     )
     camera = turntable((0, 0, 0), 3.0, 1, elevation=0.7, width=64, height=64, fov_x=0.7)[0]
     exact = render_sampled(field, camera, samples=64, edits=edits)
-    fast = Renderer(bake(field, 64), edits).render(camera, background="white")
+    fast = VoxelRenderer(bake(field, 64), edits).render(camera, background="white")
     Image.fromarray(np.hstack([exact.rgb8(), fast.rgb8()])).save(path)
 
 

@@ -19,7 +19,7 @@ from commands import refused
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
-from cagefield.rendering.nerf.nerf_renderer import render_nerf  # noqa: E402
+from cagefield.rendering.nerf.nerf_renderer import NerfRenderer  # noqa: E402
 from cagefield.training.nerf.nerf_config import NerfConfig  # noqa: E402
 
 pytestmark = pytest.mark.nightly
@@ -38,7 +38,7 @@ def test_a_nerf_is_measured_by_its_exact_pictures(tmp_path: Path) -> None:
     scene = bench.scene("microphone")
     assert scene.original is not None and max(scene.field.resolution) == 16
     cameras = scene.cameras["test"][:1]
-    exact = np.clip(render_nerf(scene.original, cameras[0], background="white").rgb, 0, 1)
+    exact = np.clip(NerfRenderer(scene.original).render(cameras[0], background="white").rgb, 0, 1)
     np.testing.assert_allclose(seen(scene, cameras)[0], exact, atol=1e-6)
     truth = bench.modeled("microphone", cameras)[0] / 255.0
     assert score.views == 1 and score.figures.unedited == pytest.approx(psnr(exact, truth), abs=1e-3)

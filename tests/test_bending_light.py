@@ -20,7 +20,7 @@ from cagefield.edits.patch import SplatPatch
 from cagefield.fields.sh import C0
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from solid_fields import db, solid_field
 from splat_rooms import LIGHT, REACH, STRENGTH
 from splat_rooms import room as splat_room
@@ -57,7 +57,7 @@ def cameras() -> tuple[Camera, ...]:
 
 def seen(field: VoxelField, edits: EditStack) -> NDArray[np.float32]:
     """Pictures of a field under edits."""
-    renderer = Renderer(field).with_edits(edits)
+    renderer = VoxelRenderer(field).with_edits(edits)
     return np.stack([renderer.render(camera, background="white").rgb for camera in cameras()])
 
 

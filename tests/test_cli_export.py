@@ -11,6 +11,7 @@ import pytest
 from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.edit_files import save_edits
+from cagefield.edits.kernel_map import KernelMap
 from cagefield.errors import CagefieldError, EditError
 from cagefield.exporting import (
     MAX_IMAGE_SIDE_PX,
@@ -229,7 +230,9 @@ def test_what_edits_take_out_of_the_box_is_seen_from_around() -> None:
 
 def test_an_edited_field_is_the_field_where_it_was_taken_from() -> None:
     field, chance = ball_field(), np.random.default_rng(0)
-    edited = EditedField(field, EditStack([MOVED]), edited_bounds(field.bounds, EditStack([MOVED])))
+    edited = EditedField(
+        field, KernelMap(EditStack([MOVED])), edited_bounds(field.bounds, EditStack([MOVED]))
+    )
     points = chance.uniform(-1, 1, (4000, 3)).astype(np.float32)
     along = np.tile(np.float32([0, 0, 1]), (4000, 1))
     sigma, rgb = edited(points, along)

@@ -26,7 +26,7 @@ from cagefield.files import user_cache
 from cagefield.geometry.cage import Cage
 from cagefield.images.render_result import RenderResult
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from solid_fields import solid_field
 from splat_rooms import cage as splat_cage
 from splat_rooms import room as splat_room
@@ -59,7 +59,7 @@ class Counted:
     """Draws a field, and counts how often."""
 
     def __init__(self, field: VoxelField) -> None:
-        self.renderer, self.count = Renderer(field), 0
+        self.renderer, self.count = VoxelRenderer(field), 0
 
     def __call__(self, camera: Camera) -> RenderResult:
         self.count += 1

@@ -12,7 +12,7 @@ from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from scenes import ball_field
 
 
@@ -91,8 +91,8 @@ def field(contracted: bool = False) -> VoxelField:
 @pytest.mark.parametrize("name", CHANGES)
 def test_occupancy_after_a_change_is_that_of_a_new_renderer(name: str, contracted: bool) -> None:
     before, after = CHANGES[name]
-    start = Renderer(field(contracted), before)
-    changed, new = start.with_edits(after).occupancy, Renderer(field(contracted), after).occupancy
+    start = VoxelRenderer(field(contracted), before)
+    changed, new = start.with_edits(after).occupancy, VoxelRenderer(field(contracted), after).occupancy
     np.testing.assert_array_equal(changed.origin, new.origin)
     np.testing.assert_array_equal(changed.blocks, new.blocks)
     np.testing.assert_array_equal(changed.codes, new.codes)
@@ -119,7 +119,7 @@ def test_refresh_of_one_edit_in_ten_is_that_of_one_alone(monkeypatch: pytest.Mon
     from cagefield.warps import flow_lattice
 
     def work(stack: EditStack, number: int) -> list[list[int]]:
-        start = Renderer(field(), stack)
+        start = VoxelRenderer(field(), stack)
         counts = [
             counted(monkeypatch, flow_lattice, "sample"),
             counted(monkeypatch, occupancy_continuous, "images_of"),
@@ -167,8 +167,8 @@ def test_while_dragged_one_of_ten_in_the_same_outer_cage_is_mapped_alone(
         mapped.append((stack.n_edits, len(found)))
         return found
 
-    def drag(stack: EditStack, number: int) -> tuple[Renderer, list[tuple[int, int]]]:
-        renderer = Renderer(field(), stack).with_edits(stack, coarse=True)
+    def drag(stack: EditStack, number: int) -> tuple[VoxelRenderer, list[tuple[int, int]]]:
+        renderer = VoxelRenderer(field(), stack).with_edits(stack, coarse=True)
         for step in range(1, 4):
             mapped.clear()
             moved = stack[number].translate((0.01 * step, 0.02 * step, 0))
@@ -181,8 +181,8 @@ def test_while_dragged_one_of_ten_in_the_same_outer_cage_is_mapped_alone(
     quick, together = drag(chain, place)
     assert alone == together and alone[0][0] == 1 and len(alone) == 1
     # It holds what all ten, looked at closely, hold; and is not much larger than what they hold by bricks.
-    fine = Renderer(field(), quick.edits).occupancy
-    whole = Renderer(field(), EditStack([])).with_edits(quick.edits, coarse=True).occupancy
+    fine = VoxelRenderer(field(), quick.edits).occupancy
+    whole = VoxelRenderer(field(), EditStack([])).with_edits(quick.edits, coarse=True).occupancy
     np.testing.assert_array_equal(fine.origin, quick.occupancy.origin)
     assert not (fine.blocks & ~quick.occupancy.blocks).any()
     assert quick.occupancy.blocks.sum() < 1.6 * whole.blocks.sum()

@@ -29,7 +29,7 @@ from cagefield.pages.page_layers import layer_key
 from cagefield.pages.page_path import MAGIC, VERSION
 from cagefield.pages.path_states import path_edits
 from cagefield.pages.scene_page import INDEX, NAMES, SCRIPT, ScenePage, write_folder
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.scene import Scene
 from commands import printed, refused
 from exported_page import pixels, rendered, settle, shown, until, web_server
@@ -228,7 +228,7 @@ def test_patches_are_those_of_edits_that_have_begun_and_of_whole_ones() -> None:
         Keyframe(pose, 45.0, 0.3, {1: 1.0, 2: 0.5}),
         Keyframe(pose, 45.0, 0.3, {1: 1.0, 2: 1.0}),
     )
-    found = path_edits(Renderer(field), EditStack([MOVE, above]), keys, False, cast(Patcher, patches))
+    found = path_edits(VoxelRenderer(field), EditStack([MOVE, above]), keys, False, cast(Patcher, patches))
     assert found is not None
     header, arrays = unpack(found.data, MAGIC, VERSION, "a path")
     shown = []

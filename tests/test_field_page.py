@@ -25,7 +25,7 @@ from cagefield.pages.page_edits import (
 )
 from cagefield.pages.page_field import encode_page_field
 from cagefield.pages.page_file import unpack
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from field_page import Drawn, FieldPage, field_page
 from page_fields import lumps
 
@@ -70,7 +70,7 @@ def test_the_page_draws_what_the_kernel_draws(page: FieldPage, degree: int, cont
     page.edit(None)
     page.load(encode_page_field(field))
     seen = camera(contracted)
-    check_alike(Renderer(field).render(seen, normals=True), page.draw(seen))
+    check_alike(VoxelRenderer(field).render(seen, normals=True), page.draw(seen))
 
 
 def test_samples_behind_empty_space_lie_beside_faces_of_cells_in_an_unbounded_field(page: FieldPage) -> None:
@@ -78,7 +78,7 @@ def test_samples_behind_empty_space_lie_beside_faces_of_cells_in_an_unbounded_fi
     page.edit(None)
     page.load(encode_page_field(field))
     seen = Camera.look_at((0.2, 0.1, 0.9), (0.1, 0.2, 0.0), width=64, height=48, fov_x=1.4)
-    ours, drawn = Renderer(field).render(seen, normals=True), page.draw(seen)
+    ours, drawn = VoxelRenderer(field).render(seen, normals=True), page.draw(seen)
     assert ours is not None and ours.normals is not None
     solid = ours.opacity > 0.5
     off = np.linalg.norm(ours.normals[solid] - drawn.normals[solid], axis=1)
@@ -92,7 +92,7 @@ def test_the_coarse_level_comes_first(page: FieldPage) -> None:
     figures = page.load(encode_page_field(field))
     assert figures["levels"] == [[1, 2], [2, 2]]
     seen = camera(False)
-    check_alike(Renderer(field).render(seen, normals=True), page.draw(seen))
+    check_alike(VoxelRenderer(field).render(seen, normals=True), page.draw(seen))
 
 
 def test_a_field_larger_than_allowed_is_refused_and_the_page_goes_on(page: FieldPage) -> None:
@@ -120,7 +120,7 @@ def test_pictures_are_the_same_after_the_context_was_lost(page: FieldPage) -> No
 
 def test_what_is_closed_leaves_nothing_on_the_gpu(page: FieldPage) -> None:
     field = lumps(0, False, (17, 17, 17))
-    edits = encode_page_edits(Renderer(field, EditStack([MOVED])))
+    edits = encode_page_edits(VoxelRenderer(field, EditStack([MOVED])))
     left = page.page.evaluate(
         """async ([field, edits]) => {
             const kinds = ["Texture", "Buffer", "Framebuffer", "VertexArray", "Program"];
@@ -208,8 +208,8 @@ def test_density_may_stay_as_it_is(page: FieldPage) -> None:
 def check_edits(page: FieldPage, field: VoxelField, edits: EditStack, preserve_opacity: bool = True) -> None:
     """The page's picture under edits is the kernel's, and not the one without them."""
     seen = camera(field.contracted)
-    renderer = Renderer(field, edits, preserve_opacity=preserve_opacity)
-    ours, without = renderer.render(seen, normals=True), Renderer(field).render(seen)
+    renderer = VoxelRenderer(field, edits, preserve_opacity=preserve_opacity)
+    ours, without = renderer.render(seen, normals=True), VoxelRenderer(field).render(seen)
     assert ours is not None and without is not None
     assert psnr(ours.rgb, without.rgb) < 30.0
     page.load(encode_page_field(field))
@@ -223,14 +223,14 @@ def check_edits(page: FieldPage, field: VoxelField, edits: EditStack, preserve_o
 def test_a_shell_without_a_lattice_gets_one_for_pages() -> None:
     exact = EditStack([TURNED.replace(lattice=None), MOVED])
     with pytest.raises(EditError, match='edit "turned" has no lattice'):
-        encode_page_edits(Renderer(lumps(0, False), exact))
+        encode_page_edits(VoxelRenderer(lumps(0, False), exact))
     assert [edit.lattice for edit in for_pages(exact)] == [LATTICE, None]
     assert for_pages(EditStack([TURNED.replace(lattice=200)])).active[0].lattice == FINEST_LATTICE
 
 
 def test_a_page_is_sent_what_it_has_not(page: FieldPage) -> None:
     field, seen = lumps(1, False), camera(False)
-    first = Renderer(field, EditStack([GONE, TURNED, BENT]))
+    first = VoxelRenderer(field, EditStack([GONE, TURNED, BENT]))
     whole = encode_changed_edits(first)
     moved = first.with_edits(EditStack([GONE, TURNED, BENT.translate((0.05, 0.0, 0.05))]))
     ours = moved.render(seen, normals=True)
@@ -256,4 +256,4 @@ def test_a_page_is_sent_what_it_has_not(page: FieldPage) -> None:
 def test_too_many_edits_are_refused() -> None:
     edits = EditStack([MOVED.translate((0.001 * n, 0, 0)) for n in range(23)])
     with pytest.raises(EditError, match="23 edits are more than"):
-        encode_page_edits(Renderer(lumps(0, False, (9, 9, 9)), edits))
+        encode_page_edits(VoxelRenderer(lumps(0, False, (9, 9, 9)), edits))

@@ -11,7 +11,7 @@ from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
 from cagefield.fields.frusta import in_frusta
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.training.voxels import inpainting
 from cagefield.training.voxels.inpainting import (
     DIFFUSION_LENGTH_VOXELS,
@@ -101,7 +101,9 @@ def test_what_was_seen_stays_and_photos_show_the_same(ball) -> None:
     np.testing.assert_array_equal(density[~hidden], before_density[~hidden])
     np.testing.assert_array_equal(colour[~hidden], before_colour[~hidden])
     for camera in ring(3):
-        one, two = (np.asarray(Renderer(f).render(camera, background="white").rgb) for f in (field, after))
+        one, two = (
+            np.asarray(VoxelRenderer(f).render(camera, background="white").rgb) for f in (field, after)
+        )
         # Inpainted vertices lie behind a transmittance of less than MIN_TRANSMITTANCE.
         assert np.abs(one - two).max() < MIN_TRANSMITTANCE
         assert np.abs(one - two).mean() < 0.005

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from benchmarks.common.cases import chosen
 from benchmarks.edits.edit_quality import eye
-from benchmarks.edits.exact_maps import KernelSamples, exact
+from benchmarks.edits.exact_maps import exact
 from benchmarks.edits.mapped_photographs import MappedScene
 from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera
-from cagefield.edits import Edit, EditStack, Flow
+from cagefield.edits import Edit, EditStack, Flow, SpaceMap
+from cagefield.edits.mapped_samples import KernelSamples
 from cagefield.errors import SceneError
 from cagefield.geometry.cage import Cage
 from cagefield.images.metrics import psnr
@@ -23,7 +24,7 @@ from cagefield.procedural.distance_cells import CELL_SIZE, DistanceCells
 from cagefield.procedural.parts import Part, Primitive, pose_matrix
 from cagefield.procedural.shapes import Box, Cylinder, Sphere
 from cagefield.procedural.textures import Plain
-from cagefield.rendering.reference_renderer import PointMap, intersect_box
+from cagefield.rendering.reference_renderer import intersect_box
 
 pytestmark = pytest.mark.nightly
 
@@ -51,7 +52,7 @@ class Still:
         return KernelSamples(points, viewdirs, np.ones(count, np.float32), np.zeros(count, bool))
 
 
-def brute(scene: ProceduralScene, mapping: PointMap, camera: Camera, spacing: float) -> NDArray[np.bool_]:
+def brute(scene: ProceduralScene, mapping: SpaceMap, camera: Camera, spacing: float) -> NDArray[np.bool_]:
     """Pixels [H,W] whose ray has a sample inside the scene, the samples so far apart."""
     origins, directions = camera.rays()
     boxes = np.stack([scene.bounds, np.asarray(mapping.bounds)])
@@ -67,7 +68,7 @@ def brute(scene: ProceduralScene, mapping: PointMap, camera: Camera, spacing: fl
     return inside.reshape(camera.height, camera.width)
 
 
-def met(scene: ProceduralScene, mapping: PointMap, camera: Camera) -> NDArray[np.bool_]:
+def met(scene: ProceduralScene, mapping: SpaceMap, camera: Camera) -> NDArray[np.bool_]:
     """Pixels [H,W] whose ray meets a surface."""
     frame = MappedScene(scene, mapping).photograph(camera, supersample=1)
     return frame.opacity > 0.5

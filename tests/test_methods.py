@@ -23,11 +23,11 @@ from benchmarks.edits.compare_shells import (
     table,
 )
 from benchmarks.edits.distortion import Distortion
-from benchmarks.edits.exact_maps import KernelMap, exact
+from benchmarks.edits.exact_maps import exact
 from benchmarks.edits.methods import METHODS
 
 from cagefield.cli import main
-from cagefield.edits import EditStack
+from cagefield.edits import EditStack, KernelMap
 from cagefield.edits.operations import MoveCorner, MoveEdge, MoveFace, Rotate, Scale, Shear, Translate
 from cagefield.errors import CagefieldError
 from scenes import TINY

@@ -74,7 +74,7 @@ def test_networks_that_do_not_fit_together_are_refused() -> None:
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
 from cagefield.fields.nerf_torch import TorchNerf, to_ndc  # noqa: E402
-from cagefield.rendering.nerf.nerf_renderer import Rays, march, render_nerf, sample_pdf, trace  # noqa: E402
+from cagefield.rendering.nerf.nerf_renderer import NerfRenderer, Rays, march, sample_pdf, trace  # noqa: E402
 from cagefield.rendering.nerf.torch_edit_map import TensorMap  # noqa: E402
 
 
@@ -205,11 +205,11 @@ def test_pictures_are_those_of_hierarchical_sampling_in_float64() -> None:
     field = small_field()
     origins, toward = camera().rays()
     rgb, opacity = reference_rays(field, origins.astype(np.float64), toward, toward @ camera().forward)
-    frame = render_nerf(field, camera(), background="black", chunk=30)
+    frame = NerfRenderer(field, chunk_rays=30).render(camera(), background="black")
     # Fine samples where the coarse weights are almost even amplify rounding of float32: 1e-3 of a pixel
     np.testing.assert_allclose(frame.rgb.reshape(-1, 3), rgb, atol=1e-3)
     np.testing.assert_allclose(frame.opacity.ravel(), np.clip(opacity, 0, 1), atol=1e-3)
-    white = render_nerf(field, camera(), background="white")
+    white = NerfRenderer(field).render(camera(), background="white")
     np.testing.assert_allclose(white.rgb, frame.rgb + 1 - frame.opacity[..., None], atol=1e-6)
 
 
@@ -246,7 +246,7 @@ def test_an_ndc_picture_is_the_one_from_ndc_rays() -> None:
 def test_rays_away_from_a_forward_facing_capture_see_nothing() -> None:
     field = small_field(ndc=(0.5, 0.5), near=0.0, far=1.0)
     back = Camera.from_fov(np.diag([-1.0, 1.0, -1.0, 1.0]), 4, 4, 0.5)
-    frame = render_nerf(field, back, background="white")
+    frame = NerfRenderer(field).render(back, background="white")
     np.testing.assert_array_equal(frame.rgb, 1.0)
     assert np.isinf(frame.depth).all()
 
@@ -315,19 +315,19 @@ def test_moving_everything_with_the_camera_gives_the_same_picture(bounded, size)
     pose[:3, :3], pose[:3, 3] = R, shift
     before = camera(6)
     after = before.with_c2w(pose @ before.c2w)
-    one = render_nerf(field, before)
-    other = render_nerf(field, after, edits=EditStack([edit]))
+    one = NerfRenderer(field).render(before)
+    other = NerfRenderer(field, edits=EditStack([edit])).render(after)
     # the same samples up to rounding, which fine sampling amplifies as above
     np.testing.assert_allclose(other.rgb, one.rgb, atol=2e-3)
     near = one.opacity > 0.01
     np.testing.assert_allclose(other.depth[near], one.depth[near], atol=1e-2)
-    assert np.abs(render_nerf(field, after).rgb - one.rgb).max() > 0.05
+    assert np.abs(NerfRenderer(field).render(after).rgb - one.rgb).max() > 0.05
 
 
 def test_emptied_samples_have_no_density() -> None:
     field = small_field()
     everything = EditStack([Edit.delete(Cage.box((0, 0, 0), 40.0))])
-    frame = render_nerf(field, camera(), edits=everything, background="none")
+    frame = NerfRenderer(field, edits=everything).render(camera(), background="none")
     np.testing.assert_array_equal(frame.opacity, 0.0)
 
 
@@ -335,7 +335,7 @@ def test_pixels_may_be_chosen() -> None:
     field = small_field()
     pixels = np.array([[3, 1], [0, 7]])
     rgb, opacity, depth = trace(field.torch, Rays.of(camera(), field.torch.device, pixels))
-    whole = render_nerf(field, camera(), background="black")
+    whole = NerfRenderer(field).render(camera(), background="black")
     np.testing.assert_allclose(rgb.cpu().numpy(), [whole.rgb[1, 3], whole.rgb[7, 0]], atol=1e-6)
     np.testing.assert_allclose(depth.cpu().numpy(), [whole.depth[1, 3], whole.depth[7, 0]], rtol=1e-5)
     assert opacity.shape == (2,)
@@ -388,7 +388,7 @@ def test_normals_are_the_slopes_of_the_edited_density(name) -> None:
     field = small_field(ndc=(0.5, 0.5), near=0.0, far=1.0) if name == "ndc" else small_field()
     edits = STACKS.get(name)
     seen_by = Camera.from_fov(np.eye(4), 8, 8, 0.9) if name == "ndc" else camera(8)
-    frame = render_nerf(field, seen_by, edits=edits, normals=True, preserve_opacity=False)
+    frame = NerfRenderer(field, edits=edits, preserve_opacity=False).render(seen_by, normals=True)
     assert frame.normals is not None
     expected = numeric_normals(field, seen_by, edits)
     cosines = (frame.normals.reshape(-1, 3) * expected).sum(axis=1)[frame.opacity.ravel() > 0.3]

@@ -169,7 +169,7 @@ torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra ner
 from cagefield.cameras.camera import Camera  # noqa: E402
 from cagefield.formats.nerf.nerf_pytorch import Checkpoint, read_checkpoint  # noqa: E402
 from cagefield.rendering.bake_fidelity import agreement  # noqa: E402
-from cagefield.rendering.nerf.nerf_renderer import Rays, render_nerf, trace  # noqa: E402
+from cagefield.rendering.nerf.nerf_renderer import NerfRenderer, Rays, trace  # noqa: E402
 from cagefield.scene.import_nerf_pytorch import import_nerf, shifted  # noqa: E402
 
 
@@ -296,7 +296,9 @@ def test_exact_pictures_show_the_original_through_the_edits(scene) -> None:
     edited = opened.with_edits(EditStack([edit]))
     camera = opened.cameras["test"][0].resized(6, 6)
     found = edited.render(camera, exact=True)
-    expected = render_nerf(opened.original, camera, edits=EditStack([edit]), background=opened.background)
+    expected = NerfRenderer(opened.original, edits=EditStack([edit])).render(
+        camera, background=opened.background
+    )
     np.testing.assert_array_equal(found.rgb, expected.rgb)
     assert np.abs(found.rgb - opened.render(camera, exact=True).rgb).max() > 0.01
     normals = edited.render(camera, exact=True, normals=True).normals
@@ -328,7 +330,7 @@ def test_agreement_is_the_psnr_of_the_pictures(scene) -> None:
 
     opened = Scene.open(scene)
     camera = opened.cameras["test"][0].resized(8, 8)
-    exact = render_nerf(opened.original, camera, background="white")
+    exact = NerfRenderer(opened.original).render(camera, background="white")
     expected = psnr(np.clip(opened.render(camera, background="white").rgb, 0, 1), exact.rgb)
     # the exact colours may exceed 1 by rounding before they are clipped
     assert agreement(opened.original, opened.field, [camera], "white") == pytest.approx(expected, abs=1e-3)

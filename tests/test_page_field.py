@@ -14,7 +14,7 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.images.metrics import psnr
 from cagefield.pages.page_field import BRICK, FINEST, coarse_field, decode_page_field, encode_page_field
 from cagefield.pages.page_file import pack, unpack
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.scene.scene import Scene
 from page_fields import lumps
 from scenes import ball_field
@@ -25,7 +25,7 @@ def test_pictures_of_a_trained_field_come_back(trained_digger: Path) -> None:
     assert isinstance(scene.field, VoxelField)
     back = decode_page_field(encode_page_field(scene.field, step=0.7, background=(0.2, 0.4, 0.6)))
     assert (back.step, back.background) == (0.7, (0.2, 0.4, 0.6))
-    ours, theirs = Renderer(scene.field), Renderer(back.field)
+    ours, theirs = VoxelRenderer(scene.field), VoxelRenderer(back.field)
     for camera in turntable(scene.field.center, 3.0, 3, elevation=0.4, width=96, height=96, fov_x=0.8):
         first, second = ours.render(camera), theirs.render(camera)
         assert first is not None and second is not None
@@ -61,7 +61,7 @@ def test_vertices_that_no_picture_shows_are_left_out() -> None:
     back = decode_page_field(encode_page_field(padded)).field
     assert len(field.vertices) < len(back.vertices) < 17**3
     camera = turntable((0, 0, 0), 3.0, 1, elevation=0.3, width=48, height=48, fov_x=0.8)[0]
-    ours, theirs = Renderer(padded).render(camera), Renderer(back).render(camera)
+    ours, theirs = VoxelRenderer(padded).render(camera), VoxelRenderer(back).render(camera)
     assert ours is not None and theirs is not None
     # -1 and 40 are float16 numbers up to the unit, 0 is exact: what is left out is not seen.
     np.testing.assert_allclose(ours.opacity, theirs.opacity, atol=2e-3)

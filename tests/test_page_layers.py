@@ -19,7 +19,7 @@ from cagefield.pages.page_field import BRICK, encode_page_field
 from cagefield.pages.page_file import from_byte_planes, unpack
 from cagefield.pages.page_layers import encode_layer
 from cagefield.rendering.reference_renderer import render_sampled
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from field_page import FieldPage, field_page
 from page_fields import lumps
 from page_layers import block_layer, patch_by_hand
@@ -55,12 +55,12 @@ def stack(field: VoxelField, name: str) -> PreparedStack:
     return PreparedStack(edits[name])
 
 
-def check_patched(page: FieldPage, field: VoxelField, edits: PreparedStack) -> Renderer:
+def check_patched(page: FieldPage, field: VoxelField, edits: PreparedStack) -> VoxelRenderer:
     """The page's picture is the kernel's, and neither that without patches nor that without edits."""
     seen = camera(field.contracted)
-    renderer = Renderer(field, edits)
+    renderer = VoxelRenderer(field, edits)
     ours = renderer.render(seen, normals=True)
-    bare = Renderer(field, EditStack(step.edit for step in edits)).render(seen)
+    bare = VoxelRenderer(field, EditStack(step.edit for step in edits)).render(seen)
     assert ours is not None and bare is not None
     assert psnr(ours.rgb, bare.rgb) < 30.0
     page.edit(None)
@@ -93,12 +93,12 @@ def test_the_page_draws_pastes_as_the_kernel_does(page: FieldPage, contracted: b
     assert both is not shown
     second = edit.translate((0.6, -0.2, 0.3))
     pastes = PreparedEdit(first, pasted=both), PreparedEdit(second, pasted=shown)
-    renderer = Renderer(field, PreparedStack([TURNED, *pastes]))
+    renderer = VoxelRenderer(field, PreparedStack([TURNED, *pastes]))
     page.edit(None)
     page.load(encode_page_field(field))
     page.edit(encode_page_edits(renderer))
     check_alike(renderer.render(seen, normals=True), page.draw(seen))
-    bare = Renderer(field, EditStack([TURNED])).render(seen)
+    bare = VoxelRenderer(field, EditStack([TURNED])).render(seen)
     assert bare is not None and psnr(page.draw(seen).rgb, bare.rgb) < (38.0 if contracted else 25.0)
 
 
@@ -108,7 +108,7 @@ def test_the_page_draws_patches_as_the_oracle_does(page: FieldPage) -> None:
     page.edit(None)
     # Samples as close as the oracle's: cuts are seen at the first sample behind them.
     page.load(encode_page_field(field, step=0.1))
-    page.edit(encode_page_edits(Renderer(field, edits)))
+    page.edit(encode_page_edits(VoxelRenderer(field, edits)))
     drawn = page.draw(seen, normals=False)
     exact = render_sampled(field, seen, edits=edits, samples=300)
     assert psnr(exact.rgb, drawn.rgb) >= LEAST
@@ -118,7 +118,7 @@ def test_the_page_draws_patches_as_the_oracle_does(page: FieldPage) -> None:
 def test_a_page_is_sent_layers_once(page: FieldPage) -> None:
     field, seen = lumps(1, False), camera(False)
     moved = patched(field, MOVED, part=False)
-    first = Renderer(field, PreparedStack([moved]))
+    first = VoxelRenderer(field, PreparedStack([moved]))
     whole = encode_changed_edits(first)
     header, arrays = unpack(whole.data, MAGIC, VERSION, "edits")
     assert {"layer.0.box", "layer.0.cells", "layer.0.sh"} <= set(arrays)
@@ -155,7 +155,7 @@ def test_layers_are_there_after_the_context_was_lost_and_gone_with_their_edits(p
     page.edit(None)
     page.load(encode_page_field(field))
     plain = page.draw(seen)
-    page.edit(encode_page_edits(Renderer(field, stack(field, "two and another"))))
+    page.edit(encode_page_edits(VoxelRenderer(field, stack(field, "two and another"))))
     before = page.draw(seen)
     page.lose_context()
     np.testing.assert_array_equal(before.rgb, page.draw(seen).rgb)
@@ -171,8 +171,8 @@ def test_textures_grow_for_layers_up_to_the_memory(page: FieldPage) -> None:
         PreparedEdit(Edit.delete(cage), patch_by_hand(field, cage, part=False, margin=0.4, seed=n))
         for n, cage in enumerate(cages)
     )
-    renderer = Renderer(field, edits)
-    content, few = encode_page_edits(renderer), encode_page_edits(Renderer(field, EditStack(edits[:1])))
+    renderer = VoxelRenderer(field, edits)
+    content, few = encode_page_edits(renderer), encode_page_edits(VoxelRenderer(field, EditStack(edits[:1])))
     page.edit(None)
     bytes_before = page.load(encode_page_field(field))["bytes"]
     page.edit(few)

@@ -22,7 +22,7 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.images.metrics import psnr
 from cagefield.rendering.reference_renderer import render_sampled
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.scene.scene import Scene
 
 THING = AnalyticField(
@@ -168,7 +168,7 @@ def test_kernel_and_oracle_show_the_same(folder: Path, contracted: bool) -> None
     stack = scene.with_edits(
         EditStack([pasted(0.7), after.translate((-0.8, 0.0, 1.1)).replace(relight="none")])
     ).patched_edits
-    frame = Renderer(field, stack, step=0.25).render(view(40), background="black")
+    frame = VoxelRenderer(field, stack, step=0.25).render(view(40), background="black")
     source = field.__call__ if contracted else field
     oracle = render_sampled(source, view(40), near=4.0, far=8.5, samples=500, edits=stack, background="black")
     assert frame is not None and oracle.opacity.max() > 0.9
@@ -312,7 +312,7 @@ def test_a_scene_that_is_not_there_is_one_clear_line(folder: Path, tmp_path: Pat
     splat_scene().save(tmp_path / "splats")
     assert "cagefield bake" in problem(tmp_path / "splats")
     with pytest.raises(EditError, match="as part of a Scene"):
-        Renderer(scene.field, EditStack([pasted(1.0)]))  # type: ignore[arg-type]
+        VoxelRenderer(scene.field, EditStack([pasted(1.0)]))  # type: ignore[arg-type]
     with pytest.raises(EditError, match="as part of a Scene"):
         EditStack([pasted(1.0)]).to_canonical(np.array([BY]))
     with pytest.raises(SceneError):

@@ -28,7 +28,7 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.fields.voxel_layers import BRICK_VERTICES, layer_slices, layer_x_offsets
 from cagefield.geometry.cage import Cage
 from cagefield.rendering.reference_renderer import render_sampled
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.scene.scene import Scene
 from solid_fields import db, solid_field
 
@@ -98,7 +98,7 @@ def test_a_box_leaves_no_trace(scenes: tuple[Scene, Scene]) -> None:
 def test_what_cameras_see_of_a_floor() -> None:
     """Beside a box, not within it nor beneath the floor; of the hole of a footprint that is left out."""
     field = room(True)
-    sight = render_visibility(lambda camera: Renderer(field).render(camera), cameras(), field.bounds)
+    sight = render_visibility(lambda camera: VoxelRenderer(field).render(camera), cameras(), field.bounds)
     asked = np.array([[0.1, 0.4, FLOOR], [0.1, 0.0, FLOOR - 0.15], [0.1, 0.0, 0.0]])
     beside, beneath, within = sight.count_views(asked, 0.05)
     assert beside >= 4 and beneath == within == 0
@@ -169,7 +169,7 @@ def test_switched_off_nothing_is_patched(scenes: tuple[Scene, Scene]) -> None:
     scene, _ = scenes
     edit = dataclasses.replace(Edit.delete(cage()), fill="none", relight="none")
     assert not needs_patch(edit) and scene.with_edits(EditStack([edit])).patched_edits[0].patch is None
-    plain = Renderer(scene.field, EditStack([edit])).render(cameras()[0])  # type: ignore[arg-type]
+    plain = VoxelRenderer(scene.field, EditStack([edit])).render(cameras()[0])  # type: ignore[arg-type]
     own = scene.with_edits(EditStack([edit])).render(cameras()[0])
     assert plain is not None and np.array_equal(plain.rgb, own.rgb)
     continuous = Edit.continuous(cage(), cage().grown(0.1)).translate((0.05, 0.0, 0.0))
@@ -226,7 +226,7 @@ def test_kernel_and_oracle_read_the_same_layers(contracted: bool) -> None:
     camera = Camera.look_at(
         (1.2 * size, -2.5 * size, 1.4 * size), tuple(box.mean(axis=0)), width=40, height=40, fov_x=0.7
     )
-    frame = Renderer(field, stack, step=0.25).render(camera, background="black")
+    frame = VoxelRenderer(field, stack, step=0.25).render(camera, background="black")
     assert frame is not None
     source = field.__call__ if contracted else field
     oracle = render_sampled(
@@ -238,7 +238,7 @@ def test_kernel_and_oracle_read_the_same_layers(contracted: bool) -> None:
     )  # fmt: skip
     assert db(frame.rgb, oracle.rgb) > 36.0 > 25.0 > db(plain.rgb, oracle.rgb)
     # Without the patch the grid of the field is used as it was.
-    assert Renderer(field, stack).with_edits(EditStack([])).grid.layers == ()
+    assert VoxelRenderer(field, stack).with_edits(EditStack([])).grid.layers == ()
 
 
 def test_layers_lie_behind_the_field_and_apart() -> None:

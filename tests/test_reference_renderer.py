@@ -189,7 +189,7 @@ def test_emptied_samples_and_stretch():
             layer=np.where(np.isnan(points[:, 0]), -1, 0),
         )
 
-    squeeze = SimpleNamespace(bounds=None, to_canonical=to_canonical)
+    squeeze = SimpleNamespace(bounds=None, layers=(), to_canonical=to_canonical)
     view = camera(10, fov_x=0.3)
     half_box = AnalyticField([UniformBox((0.125, 0, 0), (0.25, 1, 1), 2.0)])
     field = AnalyticField([UniformBox((0, 0, 0), (1, 1, 1), 2.0)])

@@ -13,7 +13,7 @@ from cagefield.geometry.cage import Cage
 from cagefield.images.metrics import psnr
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.voxels import occupancy
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 
 devices.start()
 
@@ -48,7 +48,7 @@ def sampled(field: VoxelField, edits: EditStack | None = None, samples: int = 60
 @pytest.mark.parametrize("degree", [0, 1, 2])
 def test_fused_matches_the_plain_renderer(degree, contracted):
     field = ball(contracted, degree=degree)
-    fused = Renderer(field, step=0.1).render(CAMERA, background="white")
+    fused = VoxelRenderer(field, step=0.1).render(CAMERA, background="white")
     plain = sampled(field)
     # Both are midpoint rules with steps of a tenth of a voxel; rays stop at T = 1e-3.
     assert psnr(fused.rgb, plain.rgb) > 50
@@ -64,7 +64,7 @@ def test_uniform_density_obeys_beer_lambert():
         np.array([[-1.0] * 3, [1.0] * 3]), n, np.arange(729), np.full(729, 0.7), np.zeros((729, 1, 3))
     )
     camera = Camera.look_at((0, -4, 0), (0, 0, 0), width=5, height=5, fov_x=0.02)
-    frame = Renderer(field, step=0.25).render(camera, background="black")
+    frame = VoxelRenderer(field, step=0.25).render(camera, background="black")
     # Every ray passes 2 units; colour 0.5 everywhere. The last step may overhang by half a step of 1/16.
     expected = 1 - np.exp(-0.7 * 2)
     np.testing.assert_allclose(frame.opacity, expected, atol=0.7 * np.exp(-1.4) / 16)
@@ -74,13 +74,13 @@ def test_uniform_density_obeys_beer_lambert():
 @pytest.mark.parametrize("contracted", [False, True])
 def test_skipping_empty_space_changes_nothing(contracted, monkeypatch):
     field = ball(contracted)
-    skipped = Renderer(field).render(CAMERA, background="white")
+    skipped = VoxelRenderer(field).render(CAMERA, background="white")
 
     def full(field_, threshold=0.0):
         return occupancy.of_vertices(np.ones(field_.resolution, bool))
 
     monkeypatch.setattr(occupancy, "of_field", full)
-    whole = Renderer(field).render(CAMERA, background="white")
+    whole = VoxelRenderer(field).render(CAMERA, background="white")
     if contracted:
         # Steps follow the ray's own speed, so leaps move the samples: equal up to quadrature error.
         assert psnr(skipped.rgb, whole.rgb) > 40
@@ -154,7 +154,7 @@ EDITS = {
 @pytest.mark.parametrize("name", list(EDITS))
 def test_edited_matches_the_plain_renderer(name, contracted):
     field, edits = ball(contracted), EDITS[name]
-    renderer = Renderer(field, step=0.1).with_edits(edits)
+    renderer = VoxelRenderer(field, step=0.1).with_edits(edits)
     fused = renderer.render(CAMERA, background="white")
     plain = sampled(field, edits)
     assert psnr(plain.rgb, sampled(field, samples=200).rgb) < 30  # the edit shows
@@ -167,7 +167,7 @@ def test_edited_matches_the_plain_renderer(name, contracted):
 def test_deformed_occupancy_holds_all_density_and_is_tight(name):
     """No point with density lies in a block marked empty; the marked blocks are not many more."""
     field, edits = ball(), EDITS[name]
-    occupied = Renderer(field, edits).occupancy
+    occupied = VoxelRenderer(field, edits).occupancy
     rng = np.random.default_rng(0)
     low, high = np.minimum(-1, edits.bounds[0]), np.maximum(1, edits.bounds[1])
     p = rng.uniform(low, high, (60000, 3))
@@ -185,7 +185,7 @@ def test_deformed_occupancy_holds_all_density_and_is_tight(name):
 
 def test_normals_face_outwards_on_a_ball_and_follow_an_edit():
     field = ball(density=200.0)
-    frame = Renderer(field, step=0.25).render(CAMERA, normals=True)
+    frame = VoxelRenderer(field, step=0.25).render(CAMERA, normals=True)
     origins, directions = CAMERA.rays()
     solid = (frame.opacity > 0.99).ravel()
     points = origins + directions * np.where(solid, frame.depth.ravel(), 0)[:, None]
@@ -197,7 +197,7 @@ def test_normals_face_outwards_on_a_ball_and_follow_an_edit():
     turned = EditStack(
         [Edit.continuous(Cage.box((0, 0, 0), 1.3), Cage.box((0, 0, 0), 1.9), shell=Trilinear()).scale(1.1)]
     )
-    after = Renderer(field, turned, step=0.25).render(CAMERA, normals=True)
+    after = VoxelRenderer(field, turned, step=0.25).render(CAMERA, normals=True)
     both = (after.opacity.ravel() > 0.99) & facing
     assert np.einsum("nc,nc->n", outward, after.normals.reshape(-1, 3))[both].mean() > 0.97
 
@@ -205,16 +205,18 @@ def test_normals_face_outwards_on_a_ball_and_follow_an_edit():
 def test_a_frame_can_be_abandoned_between_bands():
     calls = []
 
-    def stop() -> bool:
+    def proceed() -> None:
         calls.append(1)
-        return len(calls) > 1
+        if len(calls) > 1:
+            raise InterruptedError
 
     camera = Camera.look_at((2.6, -1.9, 1.4), (0, 0, 0), width=40, height=80, fov_x=0.75)
-    renderer = Renderer(ball())
-    assert renderer.render(camera, should_stop=stop) is None
+    renderer = VoxelRenderer(ball())
+    with pytest.raises(InterruptedError):
+        renderer.render(camera, proceed=proceed)
     assert len(calls) == 2
     whole = renderer.render(camera)
-    banded = renderer.render(camera, should_stop=lambda: False)
+    banded = renderer.render(camera, proceed=lambda: None)
     np.testing.assert_array_equal(whole.rgb, banded.rgb)
 
 
@@ -231,7 +233,7 @@ def test_a_distorted_camera_is_rendered_with_its_own_rays():
         model="opencv",
         distortion=(-0.5, 0.1, 0.02, 0.0),
     )
-    fused = Renderer(field, step=0.1).render(bent, background="white")
+    fused = VoxelRenderer(field, step=0.1).render(bent, background="white")
     plain = render_sampled(field, bent, near=1.5, far=5.5, samples=600, background="white")
     assert psnr(fused.rgb, plain.rgb) > 50
     assert psnr(fused.rgb, sampled(field).rgb) < 40
@@ -253,6 +255,6 @@ def test_a_field_ends_at_its_grid(edited: bool) -> None:
         [Edit.continuous(inner, inner.grown(0.2), lattice=8).translate((0.05, 0.0, 0.0))] if edited else []
     )
     camera = Camera.look_at((3.0, 2.4, 1.8), (0.6, 0.5, 0.4), width=32, height=32, fov_x=0.5)
-    frame = Renderer(field, edits, step=0.1).render(camera, background="black")
+    frame = VoxelRenderer(field, edits, step=0.1).render(camera, background="black")
     oracle = render_sampled(field, camera, samples=1200, background="black", edits=edits)
     assert frame is not None and psnr(frame.rgb, oracle.rgb) > 45.0

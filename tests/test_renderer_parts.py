@@ -12,7 +12,7 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.rendering.voxels.occupancy import FEW, Occupancy, encode, masks_of
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from scenes import ball_field
 
 CAMERA = Camera.look_at((0, -3, 0.8), (0, 0, 0), width=37, height=29, fov_x=0.8)
@@ -31,13 +31,15 @@ EDITS = {
 
 
 @pytest.fixture(scope="module")
-def plain() -> Renderer:
+def plain() -> VoxelRenderer:
     devices.start()
-    return Renderer(ball_field(resolution=33))
+    return VoxelRenderer(ball_field(resolution=33))
 
 
 @pytest.mark.parametrize("region", [(0, 0, 37, 29), (5, 3, 20, 17), (36, 28, 1, 1), (0, 8, 37, 8)])
-def test_a_region_is_that_part_of_the_picture(plain: Renderer, region: tuple[int, int, int, int]) -> None:
+def test_a_region_is_that_part_of_the_picture(
+    plain: VoxelRenderer, region: tuple[int, int, int, int]
+) -> None:
     whole, part = plain.render(CAMERA, normals=True), plain.render(CAMERA, normals=True, region=region)
     assert whole is not None and part is not None and whole.normals is not None
     x, y, width, height = region
@@ -48,26 +50,27 @@ def test_a_region_is_that_part_of_the_picture(plain: Renderer, region: tuple[int
 
 
 @pytest.mark.parametrize("region", [(30, 0, 8, 8), (0, -1, 4, 4), (0, 0, 0, 5), (0, 25, 5, 5)])
-def test_a_region_outside_the_picture_is_refused(plain: Renderer, region: tuple[int, int, int, int]) -> None:
+def test_a_region_outside_the_picture_is_refused(
+    plain: VoxelRenderer, region: tuple[int, int, int, int]
+) -> None:
     with pytest.raises(CagefieldError, match="is not inside the picture of 37x29 pixels"):
         plain.render(CAMERA, region=region)
 
 
-def test_bands_of_a_region_are_the_region(plain: Renderer) -> None:
+def test_bands_of_a_region_are_the_region(plain: VoxelRenderer) -> None:
     looked = []
 
-    def stop() -> bool:
+    def proceed() -> None:
         looked.append(1)
-        return False
 
-    part = plain.render(CAMERA.resized(90, 90), region=(10, 10, 70, 75), should_stop=stop)
+    part = plain.render(CAMERA.resized(90, 90), region=(10, 10, 70, 75), proceed=proceed)
     whole = plain.render(CAMERA.resized(90, 90))
     assert part is not None and whole is not None and len(looked) == 3  # 10 rows of tiles, 4 a band
     np.testing.assert_array_equal(part.rgb, whole.rgb[10:85, 10:80])
 
 
 @pytest.mark.parametrize("name", EDITS)
-def test_the_coarse_occupancy_holds_the_fine_one_and_shows_the_same(plain: Renderer, name: str) -> None:
+def test_the_coarse_occupancy_holds_the_fine_one_and_shows_the_same(plain: VoxelRenderer, name: str) -> None:
     stack = EditStack(EDITS[name])
     fine, coarse = plain.with_edits(stack), plain.with_edits(stack, coarse=True)
     assert (coarse.occupancy.blocks >= fine.occupancy.blocks).all()
@@ -88,7 +91,7 @@ def test_the_coarse_occupancy_holds_what_is_squeezed_strongly(seed: int) -> None
         density=np.full(12, 50.0, np.float32),
         sh=np.zeros((12, 1, 3), np.float32),
     )
-    plain = Renderer(field)
+    plain = VoxelRenderer(field)
     stack = EditStack([Edit.continuous(INNER, Cage.box((0, 0, 0), 1.6), lattice=48).scale(0.15)])
     fine, coarse = plain.with_edits(stack), plain.with_edits(stack, coarse=True)
     assert fine.occupancy.blocks.sum() > 50
@@ -111,7 +114,7 @@ def test_an_occupancy_gives_its_blocks_back() -> None:
     np.testing.assert_array_equal(occupancy.masks > 0, occupancy.codes < 256)
 
 
-def test_the_opacity_choice_is_the_renderers_own(plain: Renderer) -> None:
+def test_the_opacity_choice_is_the_renderers_own(plain: VoxelRenderer) -> None:
     stack = EditStack(EDITS["squeezed"])
     kept, asked = plain.with_edits(stack), plain.with_edits(stack, preserve_opacity=False)
     assert (kept.preserve_opacity, asked.preserve_opacity) == (True, False)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield import Cage, Edit, EditStack, Renderer, Scene, SplatField, load_dataset, render_sampled
+from cagefield import Cage, Edit, EditStack, Scene, SplatField, VoxelRenderer, load_dataset, render_sampled
 from cagefield.cameras.camera import Camera
 from cagefield.errors import CagefieldError, CameraError, EditError, FieldError, SceneError
 from cagefield.fields.voxel_field import VoxelField
@@ -297,7 +297,7 @@ def test_background_none_is_one_thing_for_all_renderers_and_results() -> None:
     )
     renderings = [
         partial(render_sampled, voxels, camera, samples=32),
-        partial(Renderer(voxels).render, camera),
+        partial(VoxelRenderer(voxels).render, camera),
         partial(SplatRenderer(splats).render, camera),
         lambda background: Scene(voxels, background="white").render(camera).over(background),
         Scene(voxels, background=None).render(camera).over,

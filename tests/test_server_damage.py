@@ -12,7 +12,7 @@ from cagefield.completion.lighting.ambient_occlusion import LightModel, occlusio
 from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
 from cagefield.geometry.cage import Cage
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.scene.scene import Scene
 from cagefield.server.render_queue.damage import WHOLE, Rect, Showing, pixels, screen_bounds, tiles, union
 from cagefield.server.render_queue.patch_extent import PatchExtent
@@ -352,7 +352,7 @@ def test_a_refresh_that_is_given_up_leaves_nothing_half_done() -> None:
     edits = tuple(edit.replace(relight="none") for edit in (PART.translate((0.12, 0, 0)), OTHER))
     whole = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
     task = PictureTask(1, Shown(values_of(edits)), CAMERA, whole, Display(), False, True, 0)
-    expected = Renderer(renderers.scene.field, EditStack(edits))
+    expected = VoxelRenderer(renderers.scene.field, EditStack(edits))
     for looks in range(1, 6):
         left = looks
 

@@ -123,9 +123,9 @@ def _voxels(dataset: Dataset, budget: Budget, on_progress: Callable[[Any], None]
     result = train_voxel(dataset, config, on_progress=on_progress, evaluate=False)
     if not result.finished:
         raise KeyboardInterrupt
-    from cagefield.rendering.voxels.voxel_renderer import Renderer
+    from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 
-    renderer = Renderer(result.field)
+    renderer = VoxelRenderer(result.field)
 
     behind = "white" if dataset.white_background else "black"
 

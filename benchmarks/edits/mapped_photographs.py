@@ -18,8 +18,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.edits.exact_maps import BoxedMap
 from cagefield.cameras.camera import Camera
+from cagefield.edits import SpaceMap
 from cagefield.errors import SceneError
 from cagefield.images.render_result import Background, RenderResult
 from cagefield.procedural import ProceduralScene
@@ -92,7 +92,7 @@ class MappedScene:
     """A procedural scene seen through a point map. Raises SceneError for a scene with mirrors."""
 
     scene: ProceduralScene
-    mapping: BoxedMap
+    mapping: SpaceMap
 
     def __post_init__(self) -> None:
         if any(item.primitive.mirror for item in self.scene.placed):

@@ -10,14 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import cast
 
 from benchmarks.common.figures import stacked, supersampled
 from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
-from cagefield.images.render_result import RenderResult
 from cagefield.rendering.splats.raster_splats import DeformedSplats, Places, deformed_splats
 from cagefield.rendering.splats.splat_motion import moved_splats
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
@@ -54,6 +52,6 @@ def seen_naively(scene: Scene, cameras: Sequence[Camera], rays: int = 1) -> Iter
         renderer.splats = splats
 
         def draw(camera: Camera, renderer: SplatRenderer = renderer) -> Float32:
-            return cast(RenderResult, renderer.render(camera, background="white")).rgb
+            return renderer.render(camera, background="white").rgb
 
         yield name, stacked([supersampled(draw, camera, rays) for camera in cameras])

@@ -21,7 +21,7 @@ from .geometry.cage import Cage as Cage
 from .images.render_result import RenderResult as RenderResult
 from .rendering.reference_renderer import render_sampled as render_sampled
 from .rendering.splats.splat_renderer import SplatRenderer as SplatRenderer
-from .rendering.voxels.voxel_renderer import Renderer as Renderer
+from .rendering.voxels.voxel_renderer import VoxelRenderer as VoxelRenderer
 from .scene.scene import Scene as Scene
 from .training.nerf.train_nerf import train_nerf as train_nerf
 from .training.splats.train_splats import train_splat as train_splat

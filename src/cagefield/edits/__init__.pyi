@@ -9,10 +9,12 @@ from .edit_files import dump_edits as dump_edits
 from .edit_files import load_edits as load_edits
 from .edit_files import parse_edits as parse_edits
 from .edit_files import save_edits as save_edits
-from .edit_map import CanonicalSamples as CanonicalSamples
-from .edit_map import DeformedPoints as DeformedPoints
 from .edit_map import EditMap as EditMap
 from .edit_map import PreparedStack as PreparedStack
+from .edit_map import SpaceMap as SpaceMap
+from .kernel_map import KernelMap as KernelMap
+from .mapped_samples import CanonicalSamples as CanonicalSamples
+from .mapped_samples import DeformedPoints as DeformedPoints
 from .operations import MoveCorner as MoveCorner
 from .operations import MoveCorners as MoveCorners
 from .operations import MoveEdge as MoveEdge

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import SupportsIndex
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from cagefield.edits.edit import Edit, Paste, bounds_of
+from cagefield.edits.mapped_samples import CanonicalSamples, DeformedPoints, KernelSamples
 from cagefield.edits.prepared import PreparedEdit
 from cagefield.errors import EditError
 from cagefield.fields.voxel_field import VoxelField
@@ -18,41 +19,32 @@ from cagefield.fields.voxel_layers import layer_x_offsets
 from cagefield.typing import Array, Mask
 
 
-@dataclass(frozen=True)
-class CanonicalSamples:
-    """Samples of deformed space, taken to canonical space.
-
-    points [N,3]; viewdirs [N,3] unit, d^c = J d / |J d|, and stretch [N], |J d| for unit d (both None where
-    no view directions were given); jacobian [N,3,3], d(canonical)/d(deformed); layer [N], what is read at the
-    point: 0 the field, n the n-th of `EditStack.layers`, -1 nothing.
-    """
-
-    points: Array
-    viewdirs: Array | None
-    stretch: Array | None
-    jacobian: Array
-    layer: NDArray[np.int64]
+class SpaceMap(ABC):
+    """Map from deformed to canonical space: an `EditMap`, or a `KernelMap` of one."""
 
     @property
-    def emptied(self) -> Mask:
-        """[N], True where the field must be read as empty."""
-        return np.asarray(self.layer < 0)
+    @abstractmethod
+    def boxes(self) -> Array:
+        """Deformed-space boxes [B,2,3] (min, max) outside which the map changes nothing."""
+
+    @property
+    @abstractmethod
+    def layers(self) -> tuple[VoxelField, ...]:
+        """Fields that samples of layer 1, 2, ... are read from."""
+
+    @abstractmethod
+    def to_canonical(
+        self, points: ArrayLike, viewdirs: ArrayLike | None = None
+    ) -> CanonicalSamples | KernelSamples:
+        """Canonical samples of deformed points [N,3] and unit view directions [N,3]."""
+
+    @property
+    def bounds(self) -> Array:
+        """The box [2,3] that holds `boxes`; (inf, -inf) when nothing is changed."""
+        return bounds_of(self.boxes)
 
 
-@dataclass(frozen=True)
-class DeformedPoints:
-    """Canonical points, taken to deformed space.
-
-    points [N,3]; jacobian [N,3,3], d(deformed)/d(canonical); hidden [N], True where nothing in the deformed
-    scene shows the canonical point (deleted, or covered by moved content).
-    """
-
-    points: Array
-    jacobian: Array
-    hidden: Mask
-
-
-class EditMap(ABC):
+class EditMap(SpaceMap):
     """Map of the steps s_1 ... s_n: the deformed field of s_k is the canonical field of s_(k+1).
 
     A sample goes through phi_n first and phi_1 last. Abstract: an `EditStack`, or a `PreparedStack`, which
@@ -85,11 +77,6 @@ class EditMap(ABC):
         Each is in its own edit's deformed space; a point outside all of them goes through the stack as it is.
         """
         return np.concatenate([np.zeros((0, 2, 3)), *(step.boxes for step in self.steps)])
-
-    @property
-    def bounds(self) -> Array:
-        """The box [2,3] that holds `boxes`; (inf, -inf) when nothing is changed."""
-        return bounds_of(self.boxes)
 
     def changed_boxes(
         self, before: EditMap, boxes_of: Callable[[PreparedEdit], Array] | None = None

@@ -37,7 +37,7 @@ from cagefield.errors import EditError
 from cagefield.pages.page_file import LEVEL, byte_planes, pack
 from cagefield.pages.page_layers import bricks_of, digest, encode_layer, layer_key
 from cagefield.rendering.voxels.occupancy import Occupancy
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.typing import Float32
 
 MAGIC, VERSION = b"cageedit", 3
@@ -77,7 +77,7 @@ def for_pages(edits: PreparedStack) -> PreparedStack:
     return PreparedStack(replace(step, edit=for_page(step.edit)) for step in edits)
 
 
-def encode_page_edits(renderer: Renderer) -> bytes:
+def encode_page_edits(renderer: VoxelRenderer) -> bytes:
     """The file of a renderer's edits, whose shells must be lattices (`for_pages`), and of their occupancy.
 
     Raises EditError for a shell without a lattice, and for more edits than the page's shader holds.
@@ -86,7 +86,7 @@ def encode_page_edits(renderer: Renderer) -> bytes:
 
 
 def encode_changed_edits(
-    renderer: Renderer,
+    renderer: VoxelRenderer,
     has: Collection[str] = (),
     occupancies: Mapping[str, Occupancy] | None = None,
     level: int = LEVEL,

@@ -17,7 +17,7 @@ from cagefield.errors import EditError
 from cagefield.pages.page_edits import LATTICE, for_pages
 from cagefield.pages.page_path import PathState, encode_page_path, joined_occupancy, mixable, mixed
 from cagefield.rendering.voxels.occupancy import Occupancy
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 
 STATES_A_SECOND = 12.0
 """Where edits move; the page goes straight between two. A quarter turn in two seconds is 4 degrees a state:
@@ -57,7 +57,7 @@ class PathEdits:
 
 
 def path_edits(
-    renderer: Renderer,
+    renderer: VoxelRenderer,
     edits: EditStack,
     keys: Sequence[Keyframe],
     loop: bool,

@@ -33,7 +33,7 @@ from cagefield.pages.splat_path_states import splat_path_edits
 from cagefield.rendering.splats.raster_splats import changed_splats
 from cagefield.rendering.splats.splat_provenance import with_pasted
 from cagefield.rendering.splats.splitting import split_of
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.scene.scene import Scene
 
 _HERE = files("cagefield.pages")
@@ -88,7 +88,7 @@ class ScenePage:
         if isinstance(field, SplatField):
             found, along = _splat_files(scene, field, keys, loop, on_progress)
         else:
-            plain = Renderer(field, EditStack([]), preserve_opacity=scene.preserve_opacity)
+            plain = VoxelRenderer(field, EditStack([]), preserve_opacity=scene.preserve_opacity)
             found = {"field": encode_page_field(field, step=step, background=scene.background)}
             if scene.edits.active:
                 found["edits"] = encode_page_edits(plain.with_edits(for_pages(scene.patched_edits)))

@@ -15,7 +15,7 @@ from cagefield.images.metrics import psnr
 from cagefield.images.render_result import Background, background_rgb
 
 if TYPE_CHECKING:
-    from cagefield.rendering.voxels.voxel_renderer import Renderer
+    from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 
 PIXELS = 2500
 """Pixels compared in each view, on a regular grid; of splats all."""
@@ -28,10 +28,10 @@ def agreement(
 
     Images without a background (None) are compared over white.
     """
-    from cagefield.rendering.voxels.voxel_renderer import Renderer
+    from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 
     behind = background_rgb(background) or (1.0, 1.0, 1.0)
-    renderer = Renderer(voxels)
+    renderer = VoxelRenderer(voxels)
     if isinstance(original, SplatField):
         scores = _against_splats(original, renderer, cameras, behind)
     else:
@@ -40,7 +40,10 @@ def agreement(
 
 
 def _against_splats(
-    original: SplatField, renderer: Renderer, cameras: Sequence[Camera], behind: tuple[float, float, float]
+    original: SplatField,
+    renderer: VoxelRenderer,
+    cameras: Sequence[Camera],
+    behind: tuple[float, float, float],
 ) -> list[float]:
     from cagefield.rendering.splats.splat_renderer import SplatRenderer
 
@@ -54,7 +57,10 @@ def _against_splats(
 
 
 def _against_nerf(
-    original: NerfField, renderer: Renderer, cameras: Sequence[Camera], behind: tuple[float, float, float]
+    original: NerfField,
+    renderer: VoxelRenderer,
+    cameras: Sequence[Camera],
+    behind: tuple[float, float, float],
 ) -> list[float]:
     from cagefield.rendering.nerf.nerf_renderer import Rays, trace
 

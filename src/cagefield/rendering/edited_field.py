@@ -1,15 +1,14 @@
-"""A field as its edits make it, to be asked at points of deformed space."""
+"""Field under edits, evaluated at points of deformed space."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.edits import EditMap
-from cagefield.edits.device_stack import DeviceStack
+from cagefield.edits import EditMap, SpaceMap
+from cagefield.errors import FieldError
 from cagefield.fields.protocol import Field
 from cagefield.typing import Array, Float32
 
@@ -18,31 +17,49 @@ from cagefield.typing import Array, Float32
 class EditedField:
     """A `Field` in deformed space: sigma(p) = |J d| sigma_c(p_c) of the canonical field along d.
 
-    |J d| is 1 where `preserve_opacity` is False; sigma is 0 where an edit left nothing.
+    |J d| is 1 where `preserve_opacity` is False. sigma is 0 where an edit left nothing; the color there is
+    the field's at the same point, for vertices of meshes that lie on a cut.
+
+    Parameters
+    - edits: the map, an `EditMap` in float64 or a `KernelMap` in float32.
+    - bounds: box [2,3] of the edited field, see `edited_bounds`.
+
+    Raises `FieldError` for a field that returns wrong shapes.
     """
 
     field: Field
-    edits: EditMap
+    edits: SpaceMap
     bounds: NDArray[np.float64]
     preserve_opacity: bool = True
 
-    @cached_property
-    def _stack(self) -> DeviceStack:
-        return DeviceStack.from_stack(self.edits)
-
     def __call__(self, positions: Float32, viewdirs: Float32) -> tuple[Float32, Float32]:
         """(sigma [N], rgb [N,3]) at deformed positions [N,3] along unit viewdirs [N,3]."""
-        points, along, stretch, places = self._stack.to_canonical(
-            np.asarray(positions, np.float32), np.asarray(viewdirs, np.float32)
-        )
-        sigma, rgb = self.field(points, along)
-        for layer, place in zip(self.edits.layers, self.edits.places, strict=True):
-            rows = np.flatnonzero(places == place)
+        mapped = self.edits.to_canonical(positions, viewdirs)
+        if mapped.viewdirs is None or mapped.stretch is None:
+            raise FieldError("edits.to_canonical must return viewdirs and stretch when it is given viewdirs")
+        points, along = np.asarray(mapped.points, np.float32), np.asarray(mapped.viewdirs, np.float32)
+        sigma, rgb = np.zeros(len(points), np.float32), np.zeros((len(points), 3), np.float32)
+        for number, field in enumerate((self.field, *self.edits.layers)):
+            rows = np.flatnonzero(mapped.layer == number)
             if len(rows):
-                sigma[rows], rgb[rows] = layer(points[rows], along[rows])
-        if self.preserve_opacity:
-            sigma = sigma * stretch
-        return np.where(places < 0, 0.0, sigma).astype(np.float32), rgb
+                sigma[rows], rgb[rows] = evaluate(field, points[rows], along[rows])
+                if self.preserve_opacity:
+                    sigma[rows] *= np.asarray(mapped.stretch[rows], np.float32)
+        emptied = np.flatnonzero((mapped.layer < 0) & np.isfinite(points).all(axis=1))
+        if len(emptied):
+            rgb[emptied] = evaluate(self.field, points[emptied], along[emptied])[1]
+        return sigma, rgb
+
+
+def evaluate(field: Field, points: Float32, viewdirs: Float32) -> tuple[Float32, Float32]:
+    """(sigma [N], rgb [N,3]) of a field at points [N,3]. Raises `FieldError` for wrong shapes."""
+    sigma, rgb = field(points, viewdirs)
+    if sigma.shape != (len(points),) or rgb.shape != (len(points), 3):
+        raise FieldError(
+            f"field must return sigma [{len(points)}] and rgb [{len(points)}, 3], "
+            f"not {list(sigma.shape)} and {list(rgb.shape)}"
+        )
+    return sigma, rgb
 
 
 def edited_bounds(bounds: Array, edits: EditMap) -> NDArray[np.float64]:

@@ -5,59 +5,27 @@ Rays live in deformed space; with edits, each sample is mapped to canonical spac
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from cagefield.cameras.camera import Camera
+from cagefield.edits import SpaceMap
 from cagefield.errors import FieldError
 from cagefield.fields.protocol import Field
 from cagefield.images.render_result import Background, RenderResult
 from cagefield.rendering.compositing import composite
+from cagefield.rendering.edited_field import EditedField, evaluate
 from cagefield.typing import Float32
 
 NORMAL_WEIGHT = 1e-4
 """Samples that contribute less than this to a pixel do not get a normal."""
 
 
-class PosedCamera(Protocol):
-    """What rendering needs of a camera."""
-
-    @property
-    def width(self) -> int: ...
-
-    @property
-    def height(self) -> int: ...
-
-    def rays(self) -> tuple[Float32, Float32]: ...
-
-
-class Canonical(Protocol):
-    """Samples in canonical space, as an edit stack returns them."""
-
-    @property
-    def points(self) -> NDArray[Any]: ...
-
-    @property
-    def viewdirs(self) -> NDArray[Any] | None: ...
-
-    @property
-    def stretch(self) -> NDArray[Any] | None: ...
-
-    @property
-    def layer(self) -> NDArray[Any]: ...
-
-
-class PointMap(Protocol):
-    """What rendering needs of an edit stack: the map to canonical space and the box of what it changes.
-
-    The box is None, or its minimum is above its maximum, where nothing is changed.
-    """
-
-    @property
-    def bounds(self) -> NDArray[Any] | None: ...
-
-    def to_canonical(self, points: NDArray[Any], viewdirs: NDArray[Any] | None = None) -> Canonical: ...
+_UNBOUNDED = np.array([[-np.inf] * 3, [np.inf] * 3])
+"""Box [2,3] of a field without bounds."""
 
 
 def intersect_box(origins: Float32, directions: Float32, bounds: ArrayLike) -> tuple[Float32, Float32]:
@@ -73,11 +41,11 @@ def intersect_box(origins: Float32, directions: Float32, bounds: ArrayLike) -> t
 
 def render_sampled(
     field: Field,
-    camera: PosedCamera,
+    camera: Camera,
     *,
     samples: int = 256,
     background: Background = "white",
-    edits: PointMap | None = None,
+    edits: SpaceMap | None = None,
     near: float = 0.0,
     far: float | None = None,
     normals: bool = False,
@@ -114,7 +82,10 @@ def render_sampled(
         t0, t1 = intersect_box(origins, directions, bounds)
         enter, leave = np.maximum(enter, t0), np.minimum(leave, t1)
 
-    probe = _Probe(field, edits, preserve_opacity)
+    edited: Field = field
+    if edits is not None:
+        box = _UNBOUNDED if bounds is None else np.asarray(bounds, np.float64)
+        edited = EditedField(field, edits, box, preserve_opacity)
     rgb, depth = np.zeros((count, 3), np.float32), np.full(count, np.inf, np.float32)
     opacity, normal = np.zeros(count, np.float32), np.zeros((count, 3), np.float32)
     reach = leave.max(initial=0.0) - near if bounds is None else np.linalg.norm(bounds[1] - bounds[0])
@@ -125,12 +96,12 @@ def render_sampled(
         t = enter[rows, None] + (np.arange(samples) + 0.5).astype(np.float32) * delta[:, None]
         points = np.asarray(origins[rows, None] + t[..., None] * directions[rows, None], np.float32)
         viewdirs = np.broadcast_to(directions[rows, None], points.shape)
-        sigma, color = probe(points.reshape(-1, 3), viewdirs.reshape(-1, 3))
+        sigma, color = evaluate(edited, points.reshape(-1, 3), viewdirs.reshape(-1, 3))
         sums = composite(sigma.reshape(t.shape), color.reshape(points.shape), t, delta[:, None])
         rgb[rows], opacity[rows], depth[rows] = sums.premultiplied, sums.opacity, sums.depth
         if normals:
             seen = sums.weights > NORMAL_WEIGHT
-            slopes = probe.gradient(points[seen], viewdirs[seen], 1e-3 * float(reach))
+            slopes = _density_gradient(edited, points[seen], viewdirs[seen], 1e-3 * float(reach))
             length = np.linalg.norm(slopes, axis=-1, keepdims=True)
             weighted = np.zeros_like(points)
             weighted[seen] = -slopes / np.where(length > 0, length, 1.0) * sums.weights[seen][:, None]
@@ -148,7 +119,35 @@ def render_sampled(
     )
 
 
-def _sampled_bounds(field: Field, edits: PointMap | None) -> Float32 | None:
+@dataclass(frozen=True, eq=False)
+class ReferenceRenderer:
+    """`render_sampled` with fixed options, as a `Renderer`."""
+
+    field: Field
+    edits: SpaceMap | None = None
+    preserve_opacity: bool = True
+    samples: int = 256
+    near: float = 0.0
+    far: float | None = None
+
+    def render(
+        self, camera: Camera, *, background: Background = "white", normals: bool = False
+    ) -> RenderResult:
+        """Image of the field seen by `camera`. Raises `FieldError` as `render_sampled` does."""
+        return render_sampled(
+            self.field,
+            camera,
+            samples=self.samples,
+            background=background,
+            edits=self.edits,
+            near=self.near,
+            far=self.far,
+            normals=normals,
+            preserve_opacity=self.preserve_opacity,
+        )
+
+
+def _sampled_bounds(field: Field, edits: SpaceMap | None) -> Float32 | None:
     """Box [2,3] of the field and of the regions that edits change; None when the field has no bounds."""
     own = getattr(field, "bounds", None)
     if own is None:
@@ -161,48 +160,17 @@ def _sampled_bounds(field: Field, edits: PointMap | None) -> Float32 | None:
     return np.stack([np.minimum(box[0], changed[0]), np.maximum(box[1], changed[1])])
 
 
-class _Probe:
-    """The edited field: (points, viewdirs) of deformed space to (sigma, rgb)."""
-
-    def __init__(self, field: Field, edits: PointMap | None, preserve_opacity: bool) -> None:
-        self.field, self.edits, self.preserve_opacity = field, edits, preserve_opacity
-
-    def __call__(self, points: Float32, viewdirs: Float32) -> tuple[Float32, Float32]:
-        if self.edits is None:
-            return self._evaluate(points, viewdirs)
-        mapped = self.edits.to_canonical(points, viewdirs)
-        if mapped.viewdirs is None or mapped.stretch is None:
-            raise FieldError("edits.to_canonical must return viewdirs and stretch when it is given viewdirs")
-        sigma, rgb = np.zeros(len(points), np.float32), np.zeros((len(points), 3), np.float32)
-        fields = (self.field, *getattr(self.edits, "layers", ()))
-        for number, field in enumerate(fields):
-            kept = np.flatnonzero(mapped.layer == number)
-            if not len(kept):
-                continue
-            sigma[kept], rgb[kept] = self._evaluate(
-                mapped.points[kept].astype(np.float32), mapped.viewdirs[kept].astype(np.float32), field
-            )
-            if self.preserve_opacity:
-                sigma[kept] *= mapped.stretch[kept].astype(np.float32)
-        return sigma, rgb
-
-    def _evaluate(
-        self, points: Float32, viewdirs: Float32, field: Field | None = None
-    ) -> tuple[Float32, Float32]:
-        sigma, rgb = (field or self.field)(points, viewdirs)
-        if sigma.shape != (len(points),) or rgb.shape != (len(points), 3):
-            raise FieldError(
-                f"field must return sigma [{len(points)}] and rgb [{len(points)}, 3], "
-                f"not {list(sigma.shape)} and {list(rgb.shape)}"
-            )
-        return sigma, rgb
-
-    def gradient(self, points: Float32, viewdirs: Float32, step: float) -> Float32:
-        """Central differences [N,3] of sigma in deformed space."""
-        slopes = np.empty_like(points)
-        for axis in range(3):
-            offset = np.zeros(3, np.float32)
-            offset[axis] = step
-            ahead, behind = self(points + offset, viewdirs)[0], self(points - offset, viewdirs)[0]
-            slopes[:, axis] = (ahead - behind) / (2 * step)
-        return slopes
+def _density_gradient(
+    field: Callable[[Float32, Float32], tuple[Float32, Float32]],
+    points: Float32,
+    viewdirs: Float32,
+    step: float,
+) -> Float32:
+    """Central differences [N,3] of sigma in deformed space, per world unit."""
+    slopes = np.empty_like(points)
+    for axis in range(3):
+        offset = np.zeros(3, np.float32)
+        offset[axis] = step
+        ahead, behind = field(points + offset, viewdirs)[0], field(points - offset, viewdirs)[0]
+        slopes[:, axis] = (ahead - behind) / (2 * step)
+    return slopes

@@ -72,7 +72,7 @@ from cagefield.typing import Array
 if TYPE_CHECKING:
     from cagefield.completion.patcher import Patcher
     from cagefield.datasets import Dataset
-    from cagefield.rendering.renderers import AnyRenderer
+    from cagefield.rendering.renderers import InteractiveRenderer, Renderer
 
     class Trained(Protocol):
         """Trained field, with the exposure gains [V,3] of the training photos, None without."""
@@ -368,59 +368,46 @@ class Scene:
         own = isinstance(background, str) and background == "scene"
         colour = self.background if own else background_rgb(background)
         if not exact:
-            return cast(RenderResult, self.renderer.render(camera, background=colour, normals=normals))
-        return self._render_exact(camera, colour, normals)
+            return self.renderer.render(camera, background=colour, normals=normals)
+        return self._exact_renderer(camera).render(camera, background=colour, normals=normals)
 
-    def _render_exact(self, camera: Camera, background: Background, normals: bool) -> RenderResult:
+    def _exact_renderer(self, camera: Camera) -> Renderer:
+        """The renderer that evaluates every edit in float64, without a lattice; see `render`."""
         from cagefield.fields.protocol import Field
-        from cagefield.rendering.reference_renderer import render_sampled
+        from cagefield.rendering.reference_renderer import ReferenceRenderer
 
         if self.original is not None:
-            return self._render_original(self.original, camera, background, normals)
+            return self._original_renderer(self.original)
         field = self.field
         if isinstance(field, SplatField):
-            return cast(
-                RenderResult, self._exact_splats.render(camera, background=background, normals=normals)
-            )
+            return self._exact_splats
         near, far = _sampling_range(field, camera)
         samples = math.ceil(2.0 * (far - near) / float(min(field.voxel_size)))
-        return render_sampled(
+        return ReferenceRenderer(
             # An unbounded field is sampled beyond its bounds: without them, up to `far`.
             cast(Field, field.__call__) if field.contracted else field,
-            camera,
+            self._exact_edits,
+            self.preserve_opacity,
+            samples=min(4096, max(64, samples)),
             near=near,
             far=far,
-            samples=min(4096, max(64, samples)),
-            background=background,
-            edits=self._exact_edits,
-            normals=normals,
-            preserve_opacity=self.preserve_opacity,
         )
 
-    def _render_original(
-        self, original: NerfField, camera: Camera, background: Background, normals: bool
-    ) -> RenderResult:
+    def _original_renderer(self, original: NerfField) -> Renderer:
         original.torch  # noqa: B018  a missing PyTorch is an error with its cure here
-        from cagefield.rendering.nerf.nerf_renderer import render_nerf
+        from cagefield.rendering.nerf.nerf_renderer import NerfRenderer
 
         # Patches are voxels: too rough for what a continuous edit bends, and for parts with soft seams.
         edits = [edit.replace(feather=0.0) if edit.feather else edit for edit in self.edits]
         exact = self.patcher.prepare(edits, relight_continuous=False).without_lattices()
-        return render_nerf(
-            original,
-            camera,
-            edits=exact,
-            background=background,
-            preserve_opacity=self.preserve_opacity,
-            normals=normals,
-        )
+        return NerfRenderer(original, exact, self.preserve_opacity)
 
     @cached_property
-    def renderer(self) -> AnyRenderer:
+    def renderer(self) -> InteractiveRenderer:
         """The renderer of the field's kind; a scene made by `with_edits` shares the field's arrays."""
         from cagefield.rendering.renderers import renderer_of
 
-        origin: AnyRenderer | None = self.__dict__.get("_origin")
+        origin: InteractiveRenderer | None = self.__dict__.get("_origin")
         edits = self.patched_edits
         if origin is not None:
             return origin.with_edits(edits, preserve_opacity=self.preserve_opacity)
@@ -436,7 +423,7 @@ class Scene:
         plain = cache(lambda: renderer_of(self.field))
 
         def render(camera: Camera) -> RenderResult:
-            return cast(RenderResult, plain().render(camera, background="black", normals=True))
+            return plain().render(camera, background="black", normals=True)
 
         return Patcher(self.field, self.cameras.get("train", ()), render, PasteLoader(self.sources))
 
@@ -457,7 +444,7 @@ class Scene:
         return SceneSources(self.folder, _open_pasted, self.__dict__.get("_pasting", ()))
 
     @cached_property
-    def _exact_splats(self) -> AnyRenderer:
+    def _exact_splats(self) -> InteractiveRenderer:
         return self.renderer.with_edits(self._exact_edits, preserve_opacity=self.preserve_opacity)
 
     @property

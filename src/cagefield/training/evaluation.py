@@ -115,8 +115,5 @@ def evaluate_views(field: VoxelField | SplatField, views: Sequence[View]) -> Eva
     for view in views:
         pixels = view.load()
         image = renderer.render(view.camera, background="white" if pixels.shape[2] == 4 else "black")
-        if image is not None:
-            metrics.append(
-                evaluate_image(view.name, image.rgb, composite_on_white(pixels), view.valid_pixels())
-            )
+        metrics.append(evaluate_image(view.name, image.rgb, composite_on_white(pixels), view.valid_pixels()))
     return collect_metrics(metrics)

@@ -23,6 +23,7 @@ import torch
 from torch import Tensor
 
 from cagefield.cameras.camera import Camera
+from cagefield.edits import EditMap
 from cagefield.fields.mlp import NerfParameters
 from cagefield.fields.nerf_field import NerfField
 from cagefield.fields.nerf_torch import TorchMlp, TorchNerf
@@ -83,40 +84,46 @@ class Jitter:
     noise: float = 0.0
 
 
-def render_nerf(
-    field: NerfField,
-    camera: Camera,
-    *,
-    edits: Any = None,
-    background: Background = "white",
-    chunk: int = 2048,
-    preserve_opacity: bool = True,
-    normals: bool = False,
-) -> RenderResult:
-    """Frame of a NerfField seen by a camera through an edit stack, `chunk` rays at a time.
+@dataclass(frozen=True, eq=False)
+class NerfRenderer:
+    """Renderer of a NerfField under edits, by hierarchical sampling, `chunk_rays` rays at a time.
 
     `preserve_opacity` multiplies sigma by |J d|, which keeps optical depth under the edits' stretch.
     """
-    rays = Rays.of(camera, field.torch.device)
-    parts = _traced(field.torch, rays, edits, chunk, preserve_opacity, normals)
-    shape = (camera.height, camera.width)
-    premultiplied, opacity, depth, normal = (
-        values.cpu().numpy().reshape(*shape, *values.shape[1:]) for values in parts
-    )
-    return RenderResult.from_premultiplied(
-        premultiplied, opacity, depth, normals=normal if normals else None, background=background
-    )
+
+    field: NerfField
+    edits: EditMap | None = None
+    preserve_opacity: bool = True
+    chunk_rays: int = 2048
+
+    def render(
+        self, camera: Camera, *, background: Background = "white", normals: bool = False
+    ) -> RenderResult:
+        """Image of the field seen by `camera`."""
+        rays = Rays.of(camera, self.field.torch.device)
+        columns = _traced(self.field.torch, rays, self.edits, self.chunk_rays, self.preserve_opacity, normals)
+        shape = (camera.height, camera.width)
+        premultiplied, opacity, depth, normal = (
+            values.cpu().numpy().reshape(*shape, *values.shape[1:]) for values in columns
+        )
+        return RenderResult.from_premultiplied(
+            premultiplied, opacity, depth, normals=normal if normals else None, background=background
+        )
 
 
 def trace(
-    field: TorchNerf, rays: Rays, edits: Any = None, chunk: int = 2048, preserve_opacity: bool = True
+    field: TorchNerf,
+    rays: Rays,
+    edits: EditMap | None = None,
+    chunk: int = 2048,
+    preserve_opacity: bool = True,
 ) -> tuple[Tensor, Tensor, Tensor]:
     """(premultiplied colour [N,3], opacity [N], depth [N]) of rays; depth is inf at opacity 0."""
     return _traced(field, rays, edits, chunk, preserve_opacity, False)[:3]
 
 
 def _traced(
-    field: TorchNerf, rays: Rays, edits: Any, chunk: int, preserve_opacity: bool, normals: bool
+    field: TorchNerf, rays: Rays, edits: EditMap | None, chunk: int, preserve_opacity: bool, normals: bool
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Results of `trace`, and normals [N,3], or [N,0] unless requested."""
     mapped = None

@@ -39,7 +39,7 @@ MOVING_DETAIL = 1.0
 
 
 class SplatRenderer:
-    """Renders one SplatField under one edit stack, with the same methods as `Renderer`.
+    """Renders one SplatField under one edit stack, with the same methods as `VoxelRenderer`.
 
     On a GPU the splats stay there between frames; see `splat_device`.
 
@@ -106,10 +106,11 @@ class SplatRenderer:
         normals: bool = False,
         near: float = 0.0,
         region: Region | None = None,
-        should_stop: Callable[[], bool] | None = None,
+        proceed: Callable[[], None] | None = None,
         step: float | None = None,
-    ) -> RenderResult | None:
-        """The frame seen by `camera`, or None where `should_stop` said so before or after it was projected.
+    ) -> RenderResult:
+        """Image of the splats seen by `camera`; `proceed`, called around the projection, cancels
+        by raising.
 
         `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered; nothing
         nearer than `near` is drawn; where a `step` is given, as while something moves, groups of splats
@@ -123,13 +124,13 @@ class SplatRenderer:
                     f"region {region} (x, y, width, height) is not inside the picture of"
                     f" {camera.width}x{camera.height} pixels; make it smaller"
                 )
-        if should_stop is not None and should_stop():
-            return None
+        if proceed is not None:
+            proceed()
         with self._buffers.lock:
             detail = 0.0 if step is None else MOVING_DETAIL
             seen = self.project(camera, near=near, region=region, normals=normals, detail=detail)
-            if should_stop is not None and should_stop():
-                return None
+            if proceed is not None:
+                proceed()
             picture = seen.picture(NORMALS if normals else DEPTH)
         return _frame(picture, background, normals)
 

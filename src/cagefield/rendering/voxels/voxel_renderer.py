@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from cagefield.rendering.voxels.occupancy import Occupancy
 
 BAND = 4
-"""Rows of tiles rendered between two calls of `should_stop`."""
+"""Rows of tiles rendered between two calls of `proceed`."""
 
 KEPT = 8
 """Cameras' intrinsics whose directions stay on the device."""
 
 
-class Renderer:
+class VoxelRenderer:
     """Renders one field under one edit stack; the field's arrays stay on the device between frames.
 
     `step` is the distance between samples in voxels. `with_edits` shares the field's arrays.
@@ -74,13 +74,13 @@ class Renderer:
         preserve_opacity: bool | None = None,
         coarse: bool = False,
         proceed: Callable[[], None] | None = None,
-    ) -> Renderer:
+    ) -> VoxelRenderer:
         """Renderer of the same field under other edits; shared results are reused.
 
         `coarse` finds the occupancy of the edited space by many cells at a time: ready sooner, same picture.
         `proceed` is called now and then, and gives the renderer up by raising.
         """
-        other = object.__new__(Renderer)
+        other = object.__new__(VoxelRenderer)
         other.__dict__.update(self.__dict__)
         other.edits = edits
         other.grid = self.grid.with_layers(edits.layers)
@@ -91,7 +91,7 @@ class Renderer:
 
     def _pack_edits(
         self,
-        before: Renderer | None = None,
+        before: VoxelRenderer | None = None,
         coarse: bool = False,
         proceed: Callable[[], None] | None = None,
     ) -> None:
@@ -127,10 +127,11 @@ class Renderer:
         normals: bool = False,
         near: float = 0.0,
         region: tuple[int, int, int, int] | None = None,
-        should_stop: Callable[[], bool] | None = None,
+        proceed: Callable[[], None] | None = None,
         step: float | None = None,
-    ) -> RenderResult | None:
-        """The frame seen by `camera`, or None where `should_stop` said so between two bands of tiles.
+    ) -> RenderResult:
+        """Image of the field seen by `camera`; `proceed`, called before each band of tiles, cancels by
+        raising.
 
         `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered; `step`
         takes the place of the renderer's own.
@@ -151,10 +152,10 @@ class Renderer:
             directions, camera.width, floats(camera.c2w[:3, :3]), floats(camera.c2w[:3, 3])
         )
         how = march.MarchArgs(length, near, int(normals), int(self.preserve_opacity))
-        rows = down if should_stop is None else BAND
+        rows = down if proceed is None else BAND
         for row in range(0, down, rows):
-            if should_stop is not None and should_stop():
-                return None
+            if proceed is not None:
+                proceed()
             few = min(rows, down - row)
             march.march_tiles(
                 out,

@@ -11,7 +11,7 @@ from cagefield.server.editor.identity_cache import IdentityCache
 
 if TYPE_CHECKING:
     from cagefield.completion.patcher import Patcher
-    from cagefield.rendering.renderers import AnyRenderer
+    from cagefield.rendering.renderers import InteractiveRenderer
 
 QUICK_LATTICE = 32
 """Most lattice nodes along an axis while a cage is dragged."""
@@ -23,7 +23,7 @@ class _Kept:
 
     edits: tuple[Edit, ...]
     preserve_opacity: bool
-    renderer: AnyRenderer
+    renderer: InteractiveRenderer
 
     def shows(self, edits: tuple[Edit, ...], preserve_opacity: bool) -> bool:
         return self.edits == edits and self.preserve_opacity == preserve_opacity
@@ -32,7 +32,7 @@ class _Kept:
 class EditedRenderers:
     """See the module."""
 
-    def __init__(self, plain: AnyRenderer, is_sampled: bool, patcher: Patcher) -> None:
+    def __init__(self, plain: InteractiveRenderer, is_sampled: bool, patcher: Patcher) -> None:
         """`is_sampled`: rays are sampled, and samples mapped; lattices are for those alone."""
         self._plain, self._is_sampled, self._patcher = plain, is_sampled, patcher
         self._coarse: IdentityCache[Edit, Edit] = IdentityCache(32)
@@ -40,7 +40,7 @@ class EditedRenderers:
         self._quick: list[_Kept] = []
 
     @property
-    def exact(self) -> list[AnyRenderer]:
+    def exact(self) -> list[InteractiveRenderer]:
         """The exact renderers that are ready, the newest last."""
         return [kept.renderer for kept in self._exact]
 
@@ -54,7 +54,7 @@ class EditedRenderers:
         preserve_opacity: bool,
         exact: bool,
         proceed: Callable[[], None] | None = None,
-    ) -> AnyRenderer:
+    ) -> InteractiveRenderer:
         """The renderer of the edits: one that is ready, else an exact or a quick one made now.
 
         `proceed` is called while it is made, and gives it up by raising.

@@ -17,7 +17,7 @@ from cagefield.pages.page_splats import encode_page_splats
 from cagefield.rendering.splats.raster_splats import changed_splats
 from cagefield.rendering.splats.splitting import split_of
 from cagefield.rendering.voxels.occupancy import Occupancy
-from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.render_worker.cancellation import GivenUpError, Stop, cancellation_check
 from cagefield.server.render_worker.edited_renderers import EditedRenderers
@@ -46,7 +46,7 @@ class PageFiles:
         scene, plain = self._renderers.scene, self._renderers.plain
         if isinstance(scene.field, SplatField):
             return encode_page_splats(scene.field, background=scene.background)
-        if not isinstance(scene.field, VoxelField) or not isinstance(plain, Renderer):
+        if not isinstance(scene.field, VoxelField) or not isinstance(plain, VoxelRenderer):
             raise CagefieldError(NOT_DRAWN)
         return encode_page_field(scene.field, step=plain.step, background=scene.background)
 
@@ -105,11 +105,9 @@ class PageFiles:
 
     def _renderer(
         self, renderers: EditedRenderers, edits: Sequence[Edit], task: PageEditsTask, stop: Stop
-    ) -> Renderer:
-        renderer = renderers.renderer(
-            edits, task.shown.preserve_opacity, task.exact, cancellation_check(stop)
-        )
-        if not isinstance(renderer, Renderer):
+    ) -> VoxelRenderer:
+        renderer = renderers.renderer(edits, task.shown.preserve_opacity, task.exact, cancellation_check(stop))
+        if not isinstance(renderer, VoxelRenderer):
             raise CagefieldError(NOT_DRAWN)
         return renderer
 

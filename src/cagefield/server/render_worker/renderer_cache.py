@@ -33,7 +33,7 @@ from cagefield.server.render_worker.view import Display, Region
 from cagefield.typing import Float32
 
 if TYPE_CHECKING:
-    from cagefield.rendering.renderers import AnyRenderer
+    from cagefield.rendering.renderers import InteractiveRenderer
 
 MAX_STEP_VOXELS = 1.5
 """Most voxels between samples while something moves; no more than a pixel shows, either."""
@@ -74,11 +74,9 @@ class RendererCache:
                 if task.display.before
                 else self.renderer(task.shown, task.exact, cancellation_check(stop))
             )
+            mapped = time.perf_counter()
+            frame = self._frame(task, renderer, stop)
         except GivenUpError:
-            return Stopped(task.number)
-        mapped = time.perf_counter()
-        frame = self._frame(task, renderer, stop)
-        if frame is None:
             return Stopped(task.number)
         rendered = time.perf_counter()
         near, far = self.reach(task.camera)
@@ -100,19 +98,12 @@ class RendererCache:
             time.perf_counter() - rendered,
         )
 
-    def still(
-        self, shown: Shown, camera: Camera, display: Display, stop: Stop | None = None
-    ) -> RenderResult | None:
-        """A whole picture, its edits exact; None where it was stopped."""
+    def still(self, shown: Shown, camera: Camera, display: Display, stop: Stop | None = None) -> RenderResult:
+        """A whole image, its edits exact. Raises GivenUpError once `stop` returns True."""
         region = Region(0, 0, camera.width, camera.height, camera.width, camera.height)
         task = PictureTask(0, shown, camera, region, display, stop is None, True, 0)
         stopping = stop or (lambda: False)
-        try:
-            renderer = (
-                self.plain if display.before else self.renderer(shown, True, cancellation_check(stopping))
-            )
-        except GivenUpError:
-            return None
+        renderer = self.plain if display.before else self.renderer(shown, True, cancellation_check(stopping))
         return self._frame(task, renderer, stopping)
 
     def warm(self, stage: WarmStage) -> None:
@@ -135,7 +126,9 @@ class RendererCache:
         if stage is WarmStage.PICTURE:
             renderer.render(camera)
 
-    def renderer(self, shown: Shown, exact: bool, proceed: Callable[[], None] | None = None) -> AnyRenderer:
+    def renderer(
+        self, shown: Shown, exact: bool, proceed: Callable[[], None] | None = None
+    ) -> InteractiveRenderer:
         """The renderer of the edits: one that is ready, else an exact or a quick one made now.
 
         `proceed` is called while it is made, and gives it up by raising.
@@ -168,7 +161,7 @@ class RendererCache:
         distance = float(np.linalg.norm(camera.origin - self._middle))
         return max(0.0, distance - self._radius), distance + self._radius
 
-    def _frame(self, task: PictureTask, edited: AnyRenderer, stop: Stop) -> RenderResult | None:
+    def _frame(self, task: PictureTask, edited: InteractiveRenderer, stop: Stop) -> RenderResult:
         """The region of the picture; left of a split without the edits."""
         region, split = task.region, task.display.split
         if task.display.before or split is None:
@@ -177,21 +170,18 @@ class RendererCache:
         parts: list[RenderResult] = []
         for renderer, x, width in ((self.plain, 0, left), (edited, left, region.width - left)):
             if width > 0:
-                part = self.part(task, renderer, replace(region, x=region.x + x, width=width), stop)
-                if part is None:
-                    return None
-                parts.append(part)
+                parts.append(self.part(task, renderer, replace(region, x=region.x + x, width=width), stop))
         return parts[0] if len(parts) == 1 else _beside(parts[0], parts[1])
 
     def part(
-        self, task: PictureTask, renderer: AnyRenderer, region: Region, stop: Stop
-    ) -> RenderResult | None:
+        self, task: PictureTask, renderer: InteractiveRenderer, region: Region, stop: Stop
+    ) -> RenderResult:
         return renderer.render(
             task.camera,
             background=self.scene.background,
             normals=task.display.view == "normals",
             region=(region.x, region.y, region.width, region.height),
-            should_stop=None if task.moving else stop,
+            proceed=None if task.moving else cancellation_check(stop),
             step=self._step(task.camera, renderer.step) if task.moving else None,
         )
 

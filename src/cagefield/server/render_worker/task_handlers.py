@@ -109,16 +109,18 @@ class TaskHandlers:
         """Whether the picture was added; False where those before it are gone."""
         if self._files.misses(task):
             return Answered(task.number, False)
-        frame = self._renderers.still(task.shown, task.still.camera, Display(), stop)
-        if frame is None:
+        try:
+            frame = self._renderers.still(task.shown, task.still.camera, Display(), stop)
+        except GivenUpError:
             return Stopped(task.number)
         self._files.add(task, frame)
         return Answered(task.number, True)
 
     def _still(self, task: StillTask, stop: Callable[[], bool]) -> Result:
         """The picture as a PNG."""
-        frame = self._renderers.still(task.shown, task.camera, task.display, stop)
-        if frame is None:
+        try:
+            frame = self._renderers.still(task.shown, task.camera, task.display, stop)
+        except GivenUpError:
             return Stopped(task.number)
         picture = picture_of(frame, task.display.view, self._renderers.reach(task.camera))
         return Answered(task.number, png(picture))
@@ -130,7 +132,7 @@ class TaskHandlers:
         y = min(int(task.y * camera.height), camera.height - 1)
         renderer = self._renderers.renderer(task.shown, False)
         frame = renderer.render(camera, normals=True, region=(x, y, 1, 1))
-        if frame is None or frame.normals is None or frame.opacity[0, 0] < 0.5:
+        if frame.normals is None or frame.opacity[0, 0] < 0.5:
             return None
         origins, directions = camera.rays(np.array([[x, y]]))
         point = origins[0] + float(frame.depth[0, 0]) * directions[0]
@@ -148,10 +150,11 @@ class TaskHandlers:
             edits = self._renderers.scene.patcher.prepare(below, moving=True, preserve_opacity=False)
         if isinstance(field, SplatField):
             return dense_cells(task.cage, deformed_splats(field, edits)).tolist()
+        from cagefield.edits.kernel_map import KernelMap
         from cagefield.rendering.edited_field import EditedField
 
         points = probes(task.cage).astype(np.float32)
-        edited = EditedField(field, edits, field.bounds, preserve_opacity=False)
+        edited = EditedField(field, KernelMap(edits), field.bounds, preserve_opacity=False)
         sigma, _ = edited(points, np.tile(np.array([1.0, 0.0, 0.0], np.float32), (len(points), 1)))
         return (sigma * field.sample_spacing > DENSE_VOXEL_OPACITY).tolist()
 

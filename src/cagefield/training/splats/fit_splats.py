@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from cagefield.fields.splat_field import SplatField
 from cagefield.files.temporary_folders import TemporaryFolder
 from cagefield.images.image_files import write_png
 from cagefield.images.render_result import Background, RenderResult
+from cagefield.rendering.renderers import Renderer
 from cagefield.training.result import TrainResult
 from cagefield.training.splats.initialization import InitialSplats, neighbor_spacing
 from cagefield.training.splats.plane_sweep import FREE_DISTANCE_SHARE
@@ -50,14 +50,6 @@ FREE_BLOCK_PIXELS = 4
 """Side of a pixel block that shares one free distance."""
 
 OnStage = Callable[[str, float, str], None]
-
-
-class _Renderer(Protocol):
-    """Renderer of a field, such as `rendering.voxels.voxel_renderer`'s."""
-
-    def render(
-        self, camera: Camera, *, background: Background = "white", normals: bool = False
-    ) -> RenderResult | None: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +97,7 @@ class SurfacePoints:
 
 
 def fit_splats(
-    renderer: _Renderer,
+    renderer: Renderer,
     cameras: Sequence[Camera],
     held_out: Sequence[Camera],
     bounds: Array,
@@ -156,7 +148,7 @@ def fit_splats(
 
 
 def sample_surface(
-    renderer: _Renderer,
+    renderer: Renderer,
     cameras: Sequence[Camera],
     count: int,
     *,
@@ -177,13 +169,11 @@ def sample_surface(
 
 
 def _render_images(
-    renderer: _Renderer, cameras: Sequence[Camera], background: Background, on_stage: OnStage
+    renderer: Renderer, cameras: Sequence[Camera], background: Background, on_stage: OnStage
 ) -> Iterator[RenderResult]:
     """Yield the renderer's images with normals, one per camera."""
     for number, camera in enumerate(cameras, start=1):
         image = renderer.render(camera, background=background, normals=True)
-        if image is None:
-            raise CagefieldError("an image of the field was given up; try again")
         on_stage("Rendering", number / len(cameras), f"image {number} of {len(cameras)}")
         yield image
 
