@@ -242,7 +242,7 @@ def test_all_pages_show_the_preview_and_are_told_of_its_beginning_and_its_end(pl
     expected = Shown(values_of(edits_at_time(coordinator.session.document, {1: 0.5})))
     assert coordinator.shown() != Shown(values_of((ARM, STILL)))
     np.testing.assert_allclose(
-        [e["operations"][0].by for e in coordinator.shown().edits],
+        [e.fields["operations"][0].by for e in coordinator.shown().edits],
         [e["operations"][0].by for e in expected.edits],
     )
     for task in (played.rendered(), played.rendered()):  # one for each page

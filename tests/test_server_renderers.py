@@ -122,7 +122,7 @@ def test_quick_pictures_show_the_same(renderers: RendererCache, edits: tuple[Edi
 def test_a_quick_lattice_is_coarser_and_close(renderers: RendererCache) -> None:
     fine = MOVED.replace(lattice=96)
     quick = renderers.renderer(Shown(values_of((fine,))), exact=False)
-    assert quick.edits[0].lattice == 32
+    assert quick.edits[0].edit.lattice == 32
     near = renderers.part(task(fine), quick, WHOLE, lambda: False)
     assert near is not None
     exact = renderers.scene.with_edits(EditStack([fine])).render(CAMERA)

@@ -175,7 +175,7 @@ def test_lattices_have_no_error_and_warming_up_is_possible(renderers: RendererCa
 
 def test_edits_in_a_drag_keep_their_lattices_and_are_given_up(renderers: RendererCache) -> None:
     renderer = renderers.renderer(Shown(values_of((MOVED,))), exact=False)
-    assert renderer.edits[0].lattice == 128
+    assert renderer.edits[0].edit.lattice == 128
     far = MOVED.translate((0.01, 0, 0))
     assert renderers.picture(task(far), lambda: True) == Stopped(1)
 
