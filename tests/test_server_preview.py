@@ -243,7 +243,7 @@ def test_all_pages_show_the_preview_and_are_told_of_its_beginning_and_its_end(pl
     assert coordinator.shown() != Shown(values_of((ARM, STILL)))
     np.testing.assert_allclose(
         [e.fields["operations"][0].by for e in coordinator.shown().edits],
-        [e["operations"][0].by for e in expected.edits],
+        [e.fields["operations"][0].by for e in expected.edits],
     )
     for task in (played.rendered(), played.rendered()):  # one for each page
         assert task.shown == coordinator.shown() and task.moving and not task.exact
