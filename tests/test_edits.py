@@ -242,9 +242,7 @@ def test_folded_shells_are_errors_that_say_what_is_safe() -> None:
         lambda: EditStack([edit]).to_deformed(points(10)),
         EditStack([edit]).check,
     ):
-        with pytest.raises(
-            EditError, match=message + r".*enlarge the outer cage, or use adjustment=\"discrete\""
-        ):
+        with pytest.raises(EditError, match=message + r".*enlarge the outer cage, or make the edit discrete"):
             evaluate()
     EditStack([edit.replace(allow_folding=True)]).to_canonical(points(200))
     Edit.move(edit.inner, operations=edit.operations).check()
@@ -269,8 +267,8 @@ def test_an_inner_cage_that_leaves_the_outer_is_an_error() -> None:
     edit = Edit.continuous(INNER, OUTER, shell=Trilinear(), name="arm").translate((0.6, 0, 0))
     message = (
         r'edit "arm": outer cage must contain the inner cage: inner corner \d at \(0\.9, .*\) is 0\.1 outside'
-        r" face \+x; 0\.83 of this translation .* is safe; enlarge the outer cage or use"
-        ' adjustment="discrete"'
+        r" face \+x; 0\.83 of this translation .* is safe; enlarge the outer cage or make"
+        " the edit discrete"
     )
     with pytest.raises(EditError, match=message):
         edit.check()

@@ -307,8 +307,8 @@ class Continuous(Edit):
     def __post_init__(self) -> None:
         if not isinstance(self.outer, Cage):
             self._refuse(
-                "a continuous edit needs an outer cage; give one (inner.grown(margin), say) or use"
-                ' adjustment="discrete"'
+                "a continuous edit needs an outer cage; give one (inner.grown(margin), say) or make the"
+                " edit discrete"
             )
         if not isinstance(self.shell, ShellKind):
             self._refuse(f"shell must be Flow(...) or Trilinear(), got {self.shell!r:.60}")
@@ -467,9 +467,9 @@ class Continuous(Edit):
             return (
                 f"outer cage must contain the inner cage: inner corner {k} at"
                 f" {format_vector(deformed.corners[k])} is {distance:.3g} outside face {face}",
-                '; enlarge the outer cage or use adjustment="discrete"',
+                "; enlarge the outer cage or make the edit discrete",
             )
-        cure = '; reduce it, enlarge the outer cage, or use adjustment="discrete"'
+        cure = "; reduce it, enlarge the outer cage, or make the edit discrete"
         return (
             f"the {self.shell.name} shell {self._shell(deformed).problem()}",
             "" if deformed is self.inner else cure,

@@ -10,7 +10,7 @@
                           "preserve_opacity": false if edits leave density as it is,
                           "source_to_world": [4,4] from the reconstruction's coordinates, if not the same}
 
-Edits may paste from other scenes (`Edit.source`), whose folders stay where they are: relative paths of
+Edits may paste from other scenes (`edits.Paste`), whose folders stay where they are: relative paths of
 sources are relative to SCENE.
 
 A folder is written beside its destination and renamed, so a reader sees the old scene or the new one, never
