@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cagefield.edits import Edit, EditStack, dump_edits, load_edits, parse_edits
-from cagefield.edits.edit_names import MOST_CHARACTERS, mended, problem_of_name
-from cagefield.edits.operation_sequence import MOST_OPERATIONS
+from cagefield.edits.edit_names import MAX_NAME_CHARACTERS, problem_of_name, sanitize_name
+from cagefield.edits.operation_sequence import MAX_OPERATIONS
 from cagefield.errors import CagefieldError, EditError, EditFileError
 from cagefield.geometry.cage import Cage
 from cagefield.server.editor.document import Document
@@ -70,7 +70,7 @@ def test_a_scene_that_has_such_a_name_opens_with_another(
     assert "it is replaced" in _warned(capsys, folder)
     with pytest.warns(UserWarning, match="it is replaced"):
         (edit,) = load_edits(folder / "edits.yaml", mend=True)
-    assert problem_of_name(edit.name) is None and edit.name == mended(name)
+    assert problem_of_name(edit.name) is None and edit.name == sanitize_name(name)
     assert parse_edits(dump_edits(EditStack([edit])))[0] == edit
 
 
@@ -86,8 +86,8 @@ def _warned(capsys: pytest.CaptureFixture[str], folder: Path) -> str:
 @given(st.text(st.characters(), max_size=250))
 def test_every_name_that_is_taken_comes_back_bit_for_bit(name: str) -> None:
     if problem_of_name(name) is not None:
-        name = mended(name)
-        assert problem_of_name(name) is None and len(name) <= MOST_CHARACTERS
+        name = sanitize_name(name)
+        assert problem_of_name(name) is None and len(name) <= MAX_NAME_CHARACTERS
     stack = EditStack([Edit.move(INNER, name=name)])
     for form in ("yaml", "json"):
         text = dump_edits(stack, format=form)
@@ -139,8 +139,8 @@ def test_an_edit_that_cannot_be_done_is_explained_with_few_moves(monkeypatch: py
 
 
 def test_too_many_operations_and_edits_are_one_line() -> None:
-    with pytest.raises(EditFileError, match=f"{MOST_OPERATIONS + 1} operations are too many"):
-        parse_edits(text_of("long", MOST_OPERATIONS + 1), format="json")
+    with pytest.raises(EditFileError, match=f"{MAX_OPERATIONS + 1} operations are too many"):
+        parse_edits(text_of("long", MAX_OPERATIONS + 1), format="json")
     many = json.dumps({"edits": json.loads(text_of(""))["edits"] * 501})
     with pytest.raises(EditFileError, match="501 edits are too many"):
         parse_edits(many, format="json")
@@ -177,7 +177,7 @@ def test_tags_on_values_that_are_not_theirs(tag: str) -> None:
 
 def test_check_of_many_operations_ends(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ball_scene().save(tmp_path / "scene")
-    (tmp_path / "e.json").write_text(text_of("many", MOST_OPERATIONS))
+    (tmp_path / "e.json").write_text(text_of("many", MAX_OPERATIONS))
     assert "checked, nothing written" in printed(
         capsys, "edit", tmp_path / "scene", tmp_path / "e.json", "--check"
     )

@@ -13,7 +13,7 @@ from cagefield.typing import Float32
 
 
 class BufferPool:
-    """Joins arrays [N,3], and keeps what it made to write into again once nobody holds it any more.
+    """Pool of joined arrays [N,3]; an array that nobody holds any more is written into again.
 
     A drag asks again and again for the same arrays but one: only that one is copied, and no memory is
     fetched. Arrays that are given must not change, and are held until others take their place.
@@ -38,7 +38,7 @@ class BufferPool:
 
 
 class _Made:
-    """An array, what lies in it, and whether somebody holds it."""
+    """A joined array, its parts, and a weak reference to its holder."""
 
     def __init__(self, lengths: list[int]) -> None:
         self.lengths = lengths

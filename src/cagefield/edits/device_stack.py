@@ -148,7 +148,7 @@ def _flow_table(edit: Continuous) -> NDArray[np.float32]:
 
 
 def _meets(others: NDArray[np.float32], row: NDArray[np.float32]) -> bool:
-    """True where the box of one of the other rows meets that of `row`, or of what V shows of the field."""
+    """True if the box of another row meets that of `row`, or that of the part of the field that V shows."""
     boxes = [(row[BOX : BOX + 3], row[BOX + 3 : BOX + 6])]
     if row[FIRST] == 0 and row[PART] == 0:
         image = row[RECORDS + IMAGE : RECORDS + RECORD].reshape(8, 3)

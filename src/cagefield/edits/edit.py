@@ -18,8 +18,14 @@ from cagefield.edits import operations as ops
 from cagefield.edits.edit_names import problem_of_name, problem_of_source
 from cagefield.edits.operation_sequence import ImpossibleOperationError, cages_along, problem_of_count
 from cagefield.edits.operations import Operation
-from cagefield.edits.options import FEATHER, Fill, Relight, problem_of_infill, problem_of_lattice
-from cagefield.edits.safe_fraction import as_text, flow_reach, is_valid, largest_safe
+from cagefield.edits.options import (
+    DEFAULT_FEATHER_VOXELS,
+    Fill,
+    Relight,
+    problem_of_infill,
+    problem_of_lattice,
+)
+from cagefield.edits.safe_fraction import flow_reach, format_share, is_valid, largest_safe
 from cagefield.edits.shells import (
     NO_SHELL,
     SMOOTH_FLOW,
@@ -95,7 +101,7 @@ class Edit(ABC):
     enabled: bool = True
     fill: Fill = "surroundings"
     relight: Relight = "occlusion"
-    feather: float = FEATHER
+    feather: float = DEFAULT_FEATHER_VOXELS
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "operations", tuple(self.operations))
@@ -444,7 +450,7 @@ class Continuous(Edit):
         for number in range(len(self.operations), first, -1):
             if self._is_safe(cages[number - 1]):
                 operation = self.operations[number - 1]
-                share = as_text(self.largest_share(operation, cages[number - 1]))
+                share = format_share(self.largest_share(operation, cages[number - 1]))
                 return f"; {share} of this {operation.noun} (operation {number}, {operation}) is safe"
         return ""
 

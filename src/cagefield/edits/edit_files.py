@@ -22,7 +22,7 @@
       - name: no cup
         delete: true
         inner: {center: [2, 0, 0], size: 0.5}
-        fill: surroundings                    # if left out: what it stood on goes on; or none, or a cage
+        fill: surroundings                    # if left out: its support goes on; or none, or a cage
                                               # to copy from: {clone: {center: [0, 2, 0], size: 0.5}}
         relight: occlusion                    # or none: contact shadows go along, if left out
       - name: microphone
@@ -49,11 +49,11 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.edits import file_nodes, operations
 from cagefield.edits.edit import Continuous, Copy, Delete, Edit, ImpossibleEditError, Move, Paste
-from cagefield.edits.edit_names import mended, problem_of_name
+from cagefield.edits.edit_names import problem_of_name, sanitize_name
 from cagefield.edits.file_nodes import Node
 from cagefield.edits.operation_sequence import problem_of_count
 from cagefield.edits.operations import Operation, euler_degrees
-from cagefield.edits.options import FEATHER, CastShadow, Clone, problem_of_lattices
+from cagefield.edits.options import DEFAULT_FEATHER_VOXELS, CastShadow, Clone, problem_of_lattices
 from cagefield.edits.shells import Flow, ShellKind, ShellSettings, problem_of_unused_falloff, shell_kind
 from cagefield.edits.stack import EditStack
 from cagefield.errors import CagefieldError, EditError, EditFileError
@@ -63,7 +63,7 @@ from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 
 VERSION = 1
-MOST_EDITS = 500
+MAX_EDITS = 500
 """Edits of a file: each takes a millisecond to be checked."""
 
 _SHEARS = ("xy", "xz", "yx", "yz", "zx", "zy")
@@ -109,8 +109,8 @@ def parse_edits(
 
 def _stack(node: Node, check: bool, mend: bool) -> EditStack:
     items = node.items()
-    if len(items) > MOST_EDITS:
-        raise node.error(f"{len(items)} edits are too many, a file has at most {MOST_EDITS}; leave some out")
+    if len(items) > MAX_EDITS:
+        raise node.error(f"{len(items)} edits are too many, a file has at most {MAX_EDITS}; leave some out")
     edits = [_edit(item, check, mend) for item in items]
     shown = (edit.lattice for edit in edits if edit.enabled and isinstance(edit, Continuous))
     if (problem := problem_of_lattices(shown)) is not None:
@@ -278,7 +278,7 @@ def _relight(node: Node) -> Any:
 
 
 def _fill(node: Node) -> Any:
-    """What an edit is filled with: a word, or {clone: cage}."""
+    """Infill of an edit: a word, or {clone: cage}."""
     if node.is_mapping:
         return Clone(_cage(node.mapping(required=("clone",))["clone"]))
     return node.text()
@@ -292,7 +292,7 @@ def _name(node: Node, mend: bool) -> str:
     if not mend:
         raise node.error(problem)
     warnings.warn(f"{node.error(problem)}; it is replaced", stacklevel=2)
-    return mended(name)
+    return sanitize_name(name)
 
 
 def _cage(node: Node) -> Cage:
@@ -400,7 +400,7 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
         content["relight"] = {"shadow": list(edit.relight.direction)}
     elif edit.relight != "occlusion":
         content["relight"] = edit.relight
-    if edit.feather != FEATHER:
+    if edit.feather != DEFAULT_FEATHER_VOXELS:
         content["feather"] = edit.feather
     if settings.lattice is not None:
         content["lattice"] = settings.lattice

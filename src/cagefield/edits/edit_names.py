@@ -1,18 +1,18 @@
-"""What an edit may be called: text that every file, page and terminal takes."""
+"""Names of edits: text that every file, page and terminal accepts."""
 
 from __future__ import annotations
 
 import json
 import unicodedata
 
-MOST_CHARACTERS = 200
+MAX_NAME_CHARACTERS = 200
 """Length of a name; as the editor's page has it."""
 
 MAX_PATH_CHARACTERS = 4096
 """Length of a path; as Linux has it."""
 
 _UNSAFE = ("Cc", "Cs")
-"""Unicode's categories of what no name holds: control characters, and surrogates, which no UTF-8 has."""
+"""Unicode categories that no name contains: control characters, and surrogates, which no UTF-8 has."""
 
 
 def problem_of_name(name: object) -> str | None:
@@ -22,8 +22,8 @@ def problem_of_name(name: object) -> str | None:
     problem = problem_of_text(name)
     if problem is not None:
         return f"the name {problem}"
-    if len(name) > MOST_CHARACTERS:
-        return f"the name has {len(name)} characters, a name has at most {MOST_CHARACTERS}; shorten it"
+    if len(name) > MAX_NAME_CHARACTERS:
+        return f"the name has {len(name)} characters, a name has at most {MAX_NAME_CHARACTERS}; shorten it"
     return None
 
 
@@ -40,7 +40,7 @@ def problem_of_source(source: object) -> str | None:
 
 
 def problem_of_text(text: str) -> str | None:
-    """The text and what it holds that no file, page and terminal takes; None where that is nothing."""
+    """Error text for characters that no file, page and terminal accepts; None without such characters."""
     bad = next((c for c in text if unicodedata.category(c) in _UNSAFE), None)
     if bad is None:
         return None
@@ -48,7 +48,7 @@ def problem_of_text(text: str) -> str | None:
     return f"{json.dumps(text[:40])} holds {what}, U+{ord(bad):04X}; leave it out"
 
 
-def mended(name: str) -> str:
-    """The name with what it may not hold replaced by U+FFFD, and cut."""
-    kept = (chr(0xFFFD) if unicodedata.category(c) in _UNSAFE else c for c in name[:MOST_CHARACTERS])
+def sanitize_name(name: str) -> str:
+    """The name with refused characters replaced by U+FFFD, and cut to its maximum length."""
+    kept = (chr(0xFFFD) if unicodedata.category(c) in _UNSAFE else c for c in name[:MAX_NAME_CHARACTERS])
     return "".join(kept)

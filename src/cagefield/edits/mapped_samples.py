@@ -15,8 +15,8 @@ class CanonicalSamples:
     """Samples of deformed space, taken to canonical space.
 
     points [N,3]; viewdirs [N,3] unit, d^c = J d / |J d|, and stretch [N], |J d| for unit d (both None where
-    no view directions were given); jacobian [N,3,3], d(canonical)/d(deformed); layer [N], what is read at the
-    point: 0 the field, n the n-th of `EditStack.layers`, -1 nothing.
+    no view directions were given); jacobian [N,3,3], d(canonical)/d(deformed); layer [N], the field read at
+    the point: 0 the canonical field, n the n-th of `EditStack.layers`, -1 nothing.
     """
 
     points: Array

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from cagefield.edits.operations import Operation
-from cagefield.edits.safe_fraction import as_text, is_valid, largest_safe
+from cagefield.edits.safe_fraction import format_share, is_valid, largest_safe
 from cagefield.errors import CageError
 from cagefield.geometry.cage import Cage
 
-MOST_OPERATIONS = 2000
+MAX_OPERATIONS = 2000
 """Operations of one edit: 0.1 ms each whenever its cage is computed anew."""
 
 
@@ -34,7 +34,7 @@ def cages_along(cage: Cage, operations: Sequence[Operation]) -> Iterator[Cage]:
             safe = largest_safe(lambda t, c=cage, o=operation: is_valid(o, t, c))  # type: ignore[misc]
             raise ImpossibleOperationError(
                 f"operation {number}, {operation.noun} {operation}: {error}"
-                + (f"; {as_text(safe)} of it is safe" if safe > 0.0 else ""),
+                + (f"; {format_share(safe)} of it is safe" if safe > 0.0 else ""),
                 number,
             ) from None
         cage = after
@@ -43,9 +43,9 @@ def cages_along(cage: Cage, operations: Sequence[Operation]) -> Iterator[Cage]:
 
 def problem_of_count(count: int) -> str | None:
     """Why there are too many operations, and the cure; None where there are not."""
-    if count <= MOST_OPERATIONS:
+    if count <= MAX_OPERATIONS:
         return None
     return (
-        f"{count} operations are too many, an edit has at most {MOST_OPERATIONS};"
+        f"{count} operations are too many, an edit has at most {MAX_OPERATIONS};"
         " join them, or go on in another edit"
     )

@@ -91,7 +91,7 @@ class Scale:
 
     @classmethod
     def of(cls, by: ArrayLike, axes: Axes = "world") -> Scale:
-        """The same from one factor or three."""
+        """Scaling by one factor or three."""
         return cls(_triple(factors(by, "scale")), axes)
 
     def apply(self, cage: Cage) -> Cage:

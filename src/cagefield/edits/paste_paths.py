@@ -19,7 +19,7 @@ def resolved(source: str, folder: Path | None) -> Path:
 
 
 def rebased(edits: Iterable[Edit], before: Path | None, after: Path) -> list[Edit]:
-    """The edits with relative sources that mean in the folder `after` what they mean in `before`."""
+    """The edits with relative sources rewritten from the folder `before` to the folder `after`."""
     if before is not None and real_path(before) == real_path(after):
         return list(edits)
     return [

@@ -13,10 +13,10 @@ from cagefield.edits.operations import Rotate, Scale, Translate, euler_degrees
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 
-TILTED = 1.0
+MIN_TILT_DEGREES = 1.0
 """Degrees between two directions that are up from which on a paste is turned upright."""
 
-_SHORT = 9
+_OPERATION_DECIMALS = 9
 """Decimals of operations, as a person would read them."""
 
 
@@ -41,12 +41,12 @@ def placed_paste(
         factor = float(size / (high - low).max())
         edit = edit.then(Scale.of(float(f"{factor:.6g}")))
     up, turn = np.asarray(up, np.float64), upright_turn(source_up, up)
-    if turn.magnitude() > np.radians(TILTED):
-        x, y, z = np.round(euler_degrees(turn), _SHORT).tolist()
+    if turn.magnitude() > np.radians(MIN_TILT_DEGREES):
+        x, y, z = np.round(euler_degrees(turn), _OPERATION_DECIMALS).tolist()
         edit = edit.then(Rotate((x, y, z)))
     middle = edit.deformed.corners.mean(axis=0)
     height = ((edit.deformed.corners - middle) @ up).max()
-    x, y, z = np.round(np.asarray(at, np.float64) + height * up - middle, _SHORT).tolist()
+    x, y, z = np.round(np.asarray(at, np.float64) + height * up - middle, _OPERATION_DECIMALS).tolist()
     return edit.then(Translate((x, y, z)))
 
 

@@ -1,4 +1,4 @@
-"""What takes the place of the field where a discrete edit took something away, or brought something in.
+"""Patches: content that a discrete edit shows in place of the field.
 
 A patch belongs to an edit and to the field that it was made for (`cagefield.completion`); it is no part of an
 edit file. It is read in deformed space of the edits before its own.
@@ -24,8 +24,8 @@ class Patch:
 
     Attributes:
         region: outside of V, samples in this cage read `under`; it holds V^c.
-        under: what the region shows with the content of V^c gone: filled, and in its new light.
-        part: what V shows, at its place in V^c; None where it is the field itself.
+        under: content of the region without that of V^c: filled, and in its new light.
+        part: content of V, at its place in V^c; None where it is the field itself.
     """
 
     region: Cage
@@ -40,7 +40,7 @@ class Patch:
 
 @dataclass(frozen=True, eq=False)
 class NewLight:
-    """The log of what the light at points of a grid is multiplied by, values [X,Y,Z].
+    """Log ratio of new light to old at the vertices of a grid, values [X,Y,Z].
 
     Vertex (0, 0, 0) lies at `origin` [3], the next ones `spacing` [3] apart, world units; `known` [X,Y,Z] are
     those with a value.
@@ -61,7 +61,7 @@ class NewLight:
 
 @dataclass(frozen=True, eq=False)
 class SplatPatch:
-    """What a discrete edit of splats shows beside what it moves: fill, and new light.
+    """Infill and new light of a discrete edit of splats.
 
     Attributes:
         field: the field whose splats the new ones are copies of.
@@ -70,8 +70,8 @@ class SplatPatch:
         light: that of splats outside of V^c.
         part: that of the content of V^c, None where it stays.
         sources: [A] int64, rows of the field of the new splats; points: [A,3] where they are; jacobian:
-            [A,3,3], what their shapes were multiplied by, d(deformed)/d(canonical); gains: [A,3], what their
-            red, green and blue are multiplied by.
+            [A,3,3], factor of their shapes, d(deformed)/d(canonical); gains: [A,3], factors of their
+            red, green and blue.
     """
 
     field: SplatField
@@ -101,11 +101,11 @@ class SplatPatch:
 
 @dataclass(frozen=True, eq=False)
 class Pasted:
-    """What a paste (`Edit.source`) shows in the field that it was made for.
+    """Content of a paste (`edits.Paste`) in the field that it was made for.
 
     Attributes:
-        part: of voxels, a layer, which has in `place` what V^c holds in the other scene; place: a cage in the
-            field's grid.
+        part: of voxels, a layer, which has in `place` the content of V^c in the other scene; place: a cage in
+            the field's grid.
         splats: of splats, those in V^c, in the other scene's space.
     """
 

@@ -14,8 +14,8 @@ from cagefield.geometry.cage_checks import factors
 from cagefield.typing import Array, Mask
 from cagefield.warps import FlowShell
 
-PARTS = 16
-TOLERANCE = 1e-3
+SHARES_PER_ROUND = 16
+SHARE_TOLERANCE = 1e-3
 
 
 def along(operation: Operation, cage: Cage, t: Array) -> Array:
@@ -47,13 +47,13 @@ def along(operation: Operation, cage: Cage, t: Array) -> Array:
 def flow_reach(operation: Operation, cage: Cage, edit: tuple[Cage, Cage], *, fine: bool) -> float:
     """Largest share of an operation on a deformed cage up to which a flow shell may surround it.
 
-    `edit` is the canonical inner and the outer cage. See `FlowShell.may_surround` for what is left open.
+    `edit` is the canonical inner and the outer cage. `FlowShell.may_surround` names the cases left open.
     """
 
     return largest_of(lambda t: FlowShell.may_surround(*edit, along(operation, cage, t), fine=fine))
 
 
-def largest_of(safe: Callable[[Array], Mask], tolerance: float = TOLERANCE) -> float:
+def largest_of(safe: Callable[[Array], Mask], tolerance: float = SHARE_TOLERANCE) -> float:
     """Largest t in [0,1], to the tolerance, such that everything from 0 to t is safe.
 
     `safe` is asked for sixteenths of the range, then for parts of the one in which it first is not.
@@ -62,7 +62,7 @@ def largest_of(safe: Callable[[Array], Mask], tolerance: float = TOLERANCE) -> f
     if not safe(np.zeros(1))[0]:
         return 0.0
     while high - low > tolerance:
-        t = np.linspace(low, high, min(PARTS, int(np.ceil((high - low) / tolerance))) + 1)
+        t = np.linspace(low, high, min(SHARES_PER_ROUND, int(np.ceil((high - low) / tolerance))) + 1)
         mask = safe(t[1:])
         if mask.all():
             return high
@@ -97,6 +97,6 @@ def is_valid(operation: Operation, t: float, cage: Cage) -> bool:
     return True
 
 
-def as_text(share: float) -> str:
-    """A share as text, rounded down so that what is said to be safe is."""
+def format_share(share: float) -> str:
+    """A share as text, rounded down to stay safe."""
     return f"{np.floor(100.0 * share) / 100.0:.2f}"

@@ -19,15 +19,15 @@ from cagefield.warps.lattice import Lattice
 from cagefield.warps.trilinear_shell import TrilinearShell
 
 NODE_BYTES = 32
-"""Bytes of a node: 12 as it is sampled, 12 in the stack, and the padding of what kernels hold."""
+"""Bytes of a node: 12 as sampled, 12 in the stack, and the padding of the kernels' copies."""
 
-_ALWAYS = 64
+_UNCHECKED_NODES_PER_AXIS = 64
 
 LATTICE_STRAIN = 1.0
 """Strain of a step (see `FlowShell`) for a lattice of up to 32^3 nodes; finer ones take (R / 32)^-1/2 of it.
 
-Chosen by measurement over the edits of `benchmarks/flow_lattice.py`: what the integration adds to the
-interpolation's own error, worst of the edits, in the mean and in the largest error:
+Chosen by measurement over the edits of `benchmarks/flow_lattice.py`: error that the integration adds to the
+interpolation's own, worst of the edits, in the mean and in the largest error:
 
     strain    1.0          0.7          0.5          0.35
     32^3      1% and 4%    0% and 1%    0% and 0%    0% and 0%
@@ -63,7 +63,7 @@ def sample_nodes(warp: ContinuousWarp, resolution: int) -> NDArray[np.float32]:
 
 def _check_memory(resolution: int) -> None:
     needed, free = NODE_BYTES * resolution**3, memory.free_memory()
-    if resolution > _ALWAYS and free is not None and needed > free // 2:
+    if resolution > _UNCHECKED_NODES_PER_AXIS and free is not None and needed > free // 2:
         raise EditError(
             f"a lattice of {resolution} nodes per axis takes {needed / 1e9:.1f} GB, of the "
             f"{free / 1e9:.1f} GB that are free at most half is taken; give it a lower resolution"

@@ -38,7 +38,7 @@ UNDER = 32  # where samples of a discrete edit's region are read: `EMPTY`, or th
 PART = 33  # where samples of V are read: 0, the field as the earlier edits make it, or the place of a layer
 RECORDS = 34
 EMPTY = -1.0
-AFFINE, MATRIX, CENTRE, LOW, HIGH, BEND, IMAGE, RECORD = 0, 1, 10, 13, 16, 19, 31, 55
+AFFINE, MATRIX, CENTER, LOW, HIGH, BEND, IMAGE, RECORD = 0, 1, 10, 13, 16, 19, 31, 55
 WIDTH = RECORDS + 8 * RECORD
 
 EDGE = 1e-6
@@ -113,7 +113,7 @@ def _record(row: NDArray[np.float32], number: int, corners: Array, onto: Array |
 
 
 def widened(boxes: Array) -> Array:
-    """Boxes [B,2,3] made larger by what float32 samples may be off."""
+    """Boxes [B,2,3] grown by the rounding error of float32 samples."""
     rounding = 1e-6 * np.abs(boxes).max(axis=(1, 2), initial=0.0)
     slack = BOX_SLACK * (boxes[:, 1] - boxes[:, 0]) + rounding[:, None]
     return np.stack([boxes[:, 0] - slack, boxes[:, 1] + slack], axis=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cagefield.edits.edit_names import MOST_CHARACTERS
+from cagefield.edits.edit_names import MAX_NAME_CHARACTERS
 from cagefield.edits.operations import Operation
 from cagefield.server.editor.document import Document, Entry
 from cagefield.server.editor.drag_solver import Target
@@ -35,7 +35,7 @@ def fresh_name(document: Document, stem: str) -> str:
     if stem not in taken and stem != "edit":
         return stem
     number = 1 if stem == "edit" else 2
-    stem = stem[: MOST_CHARACTERS - 8]
+    stem = stem[: MAX_NAME_CHARACTERS - 8]
     while f"{stem} {number}" in taken:
         number += 1
     return f"{stem} {number}"

@@ -17,7 +17,7 @@ from pathlib import Path
 from cagefield.cameras.keyframe_files import dump_path, load_keys
 from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import Edit, EditStack, parse_edits
-from cagefield.edits.edit_files import MOST_EDITS, VERSION, save_edits
+from cagefield.edits.edit_files import MAX_EDITS, VERSION, save_edits
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.splat_field import SplatField
 from cagefield.files import json_text
@@ -78,7 +78,7 @@ class SceneStore:
         self._field = self.files[0]
         self._warned: object = None
         self._kept: Document | None = None
-        self._values: IdentityCache[Edit, object] = IdentityCache(4 * MOST_EDITS)
+        self._values: IdentityCache[Edit, object] = IdentityCache(4 * MAX_EDITS)
         """Edit-file values of the edits written last."""
 
     # ---- opening ----

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from cagefield.cameras.keyframes import Keyframe, Timeline
 from cagefield.edits import Continuous, Edit, Paste
-from cagefield.edits.edit_files import MOST_EDITS
+from cagefield.edits.edit_files import MAX_EDITS
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
@@ -62,7 +62,7 @@ class Session:
         self.revision = 1
         self._saved: Document | None = document
         self._next = max((entry.id for entry in document.entries), default=0) + 1
-        self._problems: IdentityCache[Edit, str | None] = IdentityCache(4 * MOST_EDITS)
+        self._problems: IdentityCache[Edit, str | None] = IdentityCache(4 * MAX_EDITS)
 
     # ---- what is there ----
 

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 from pydantic import Field, TypeAdapter
 
 from cagefield.cameras.camera_paths import MIN_FPS
-from cagefield.edits.options import LATTICE_RANGE
+from cagefield.edits.options import LATTICE_NODES_RANGE
 from cagefield.server.editor.drag_solver import Target
 from cagefield.server.editor.edit_kinds import Kind
 from cagefield.server.protocol.common import (
@@ -187,7 +187,7 @@ class Change(Message):
     width: Annotated[float, Field(gt=0, le=1)] | None = None
     fill: FillName | None = None
     relight: RelightName | None = None
-    lattice: Annotated[int, Field(ge=0, le=LATTICE_RANGE[1])] | None = Field(
+    lattice: Annotated[int, Field(ge=0, le=LATTICE_NODES_RANGE[1])] | None = Field(
         default=None, description="0: exact"
     )
 

@@ -14,7 +14,7 @@ from cagefield.edits.device.kernels.hexahedron import image, in_box, locate, rea
 from cagefield.edits.device.kernels.lattice import first_node, interpolate, to_nodes
 from cagefield.edits.device.packing import (
     BOX,
-    CENTRE,
+    CENTER,
     CONTINUOUS,
     EDGE,
     FIRST,
@@ -78,7 +78,7 @@ def map_edit(
     best = 1e30
     at = vec3(0.0, 0.0, 0.0)
     if params[e, SIMPLE] > 0.5:
-        y = times(params, e, RECORDS + MATRIX, p - read3(params, e, RECORDS + CENTRE))
+        y = times(params, e, RECORDS + MATRIX, p - read3(params, e, RECORDS + CENTER))
         if qd.abs(y).max() <= 1.0 + EDGE:
             hit = 0
             at = qd.max(qd.min(y, 1.0), -1.0)
@@ -137,7 +137,7 @@ def map_edit(
 @qd.func
 def likely_side(p: vec3, params: qd.template(), e: qd.i32):
     """The record of the shell's side that p would lie in if the cages were concentric boxes."""
-    y = times(params, e, RECORDS + MATRIX, p - read3(params, e, RECORDS + CENTRE))
+    y = times(params, e, RECORDS + MATRIX, p - read3(params, e, RECORDS + CENTER))
     size = qd.abs(y)
     side = 0
     value = y.x

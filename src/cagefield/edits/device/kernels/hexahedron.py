@@ -1,13 +1,13 @@
 """The map of one hexahedron for one sample, inside Quadrants kernels, in float32, from its record in a row.
 
-The records, and what xi, the bend and the image are, are those of `packing`. The float64 reference is
+Records, xi, the bend and the image are defined in `packing`. The float64 reference is
 `inner_map.HexahedronMap`.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
 from cagefield.compute.quadrants import qd
-from cagefield.edits.device.packing import AFFINE, BEND, CENTRE, IMAGE, LOW, MATRIX
+from cagefield.edits.device.packing import AFFINE, BEND, CENTER, IMAGE, LOW, MATRIX
 from cagefield.warps.kernels.flow_velocity import solve_columns
 
 vec3 = qd.math.vec3
@@ -20,7 +20,7 @@ def locate(p: vec3, params: qd.template(), e: qd.i32, at: qd.i32):
     The error is the distance to the cube plus the residual of Newton's method, both in units of xi; 0 for a
     point inside.
     """
-    y = times(params, e, at + MATRIX, p - read3(params, e, at + CENTRE))
+    y = times(params, e, at + MATRIX, p - read3(params, e, at + CENTER))
     xi = y
     error = 0.0
     if params[e, at + AFFINE] < 0.5:

@@ -18,7 +18,7 @@ from cagefield.edits.device.packing import (
     AFFINE,
     ALONE,
     BOX,
-    CENTRE,
+    CENTER,
     CONTINUOUS,
     EDGE,
     FIRST,
@@ -119,7 +119,7 @@ def is_straight(params: qd.template(), e: qd.i32):
 @qd.func
 def through(origin: vec3, d: vec3, params: qd.template(), e: qd.i32, at: qd.i32):
     """([t_in, t_out] in a record's parallelepiped, xi of the ray's origin)."""
-    xi = times(params, e, at + MATRIX, origin - read3(params, e, at + CENTRE))
+    xi = times(params, e, at + MATRIX, origin - read3(params, e, at + CENTER))
     velocity = times(params, e, at + MATRIX, d)
     one = vec3(1.0 + EDGE, 1.0 + EDGE, 1.0 + EDGE)
     return slab(xi, safe_inverse(velocity), -one, one), xi
