@@ -114,9 +114,9 @@ class LightModel:
             np.zeros(len(surfels.points)) if self.diffuse is None else self.diffuse.log_light(surfels.normals)
         )
 
-    def log_openness(self, occlusion_terms: Array) -> Array:
+    def log_openness(self, terms: Array) -> Array:
         """log o [N], o at least MIN_OPENNESS, of occlusion terms [N,R]."""
-        return np.asarray(np.log(np.maximum(1.0 - occlusion_terms @ np.array(self.weights), MIN_OPENNESS)))
+        return np.asarray(np.log(np.maximum(1.0 - terms @ np.array(self.weights), MIN_OPENNESS)))
 
 
 def occlusion_terms(around: Sequence[Surfels], surfels: Surfels, radii: Sequence[float]) -> Array:
