@@ -106,7 +106,8 @@ class PageFiles:
     def _renderer(
         self, renderers: EditedRenderers, edits: Sequence[Edit], task: PageEditsTask, stop: Stop
     ) -> VoxelRenderer:
-        renderer = renderers.renderer(edits, task.shown.preserve_opacity, task.exact, cancellation_check(stop))
+        check = cancellation_check(stop)
+        renderer = renderers.renderer(edits, task.shown.preserve_opacity, task.exact, check)
         if not isinstance(renderer, VoxelRenderer):
             raise CagefieldError(NOT_DRAWN)
         return renderer
