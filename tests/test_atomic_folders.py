@@ -39,7 +39,7 @@ def test_the_users_own_files_are_kept(
     tmp_path: Path, can_exchange: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not can_exchange:
-        monkeypatch.setattr(atomic, "exchanged", lambda one, other: False)
+        monkeypatch.setattr(atomic, "exchange_names", lambda one, other: False)
     target = tmp_path / "out"
     (target / "mine").mkdir(parents=True)
     (target / "mine" / "deep.txt").write_text("mine")
@@ -82,9 +82,9 @@ _KILLED = textwrap.dedent("""
             setattr(module, name, call)
 
         if way == "renames":
-            atomic.exchanged = lambda one, other: False
+            atomic.exchange_names = lambda one, other: False
         else:
-            counted(atomic, "exchanged")
+            counted(atomic, "exchange_names")
         for name in ("rename", "replace", "link", "unlink", "rmdir", "mkdir", "chmod", "open"):
             counted(os, name)
         return main(["edit", "out", edits, "--overwrite"])

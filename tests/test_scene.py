@@ -127,7 +127,7 @@ def test_failed_swap_puts_the_old_scene_back(tmp_path: Path, monkeypatch: pytest
         return rename(self, target)
 
     monkeypatch.setattr(Path, "rename", refuse_new)
-    monkeypatch.setattr("cagefield.files.atomic.exchanged", lambda one, other: False)
+    monkeypatch.setattr("cagefield.files.atomic.exchange_names", lambda one, other: False)
     with pytest.raises(PermissionError):
         Scene(ball_field(density=3.0)).save(path, overwrite=True)
     assert files_of(path) == before

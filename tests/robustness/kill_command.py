@@ -75,7 +75,7 @@ def renamed(command: Command, target: str | None = None) -> Command:
     def work(folder: Path, say: Say) -> None:
         from cagefield.files import atomic
 
-        atomic.exchanged = lambda one, other: False
+        atomic.exchange_names = lambda one, other: False
         command.work(folder, say)
 
     def problem(folder: Path, said: int) -> str | None:
