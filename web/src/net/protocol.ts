@@ -111,7 +111,7 @@ export interface Ask {
   edit?: number | null;
 }
 /**
- * What the page looks from; `moving` while the mouse turns the view.
+ * Camera of the page; `moving` while the mouse turns the view.
  */
 export interface CameraMessage {
   type: "camera";
@@ -123,14 +123,14 @@ export interface CameraMessage {
   moving: boolean;
 }
 /**
- * Stops a job; what it wrote of its file is removed.
+ * Stop a job and remove its unfinished file.
  */
 export interface CancelJob {
   type: "cancel_job";
   job: number;
 }
 /**
- * Changes an edit's options; what is left out stays.
+ * Change an edit's options; omitted options stay.
  */
 export interface Change {
   type: "change";
@@ -150,7 +150,7 @@ export interface Change {
   lattice?: number | null;
 }
 /**
- * What has no more than an edit to say.
+ * Command with an edit's number as its only argument.
  */
 export interface Command {
   type: "command";
@@ -166,7 +166,7 @@ export interface Command {
   edit?: number | null;
 }
 /**
- * What is shown: a view; `before` leaves the edits out, `split` left of a share of the width.
+ * Display of a view; `before` leaves the edits out, `split` left of a share of the width.
  */
 export interface DisplayMessage {
   type: "display";
@@ -209,7 +209,7 @@ export interface DragMove {
   operation: TranslateBy | RotateBy | ScaleBy | ShearBy | MoveCornersBy;
 }
 /**
- * Which pictures the page draws itself: none, those of what moves, or all. It gets the edits instead.
+ * Images that the page draws itself: none, those during motion, or all. It receives the edits instead.
  */
 export interface Drawing {
   type: "drawing";
@@ -283,7 +283,7 @@ export interface PasteScene {
 /**
  * A new edit: a cage pair around the surface seen at a pixel (x, y in [0,1] of the camera's picture).
  *
- * Without a pixel it goes around the middle of what the camera sees.
+ * Without a pixel it goes around the middle of the visible surface.
  */
 export interface Place {
   type: "place";
@@ -313,7 +313,7 @@ export interface PlayEnd {
   play: number;
 }
 /**
- * The page has shown a picture, or what edits make; until then the server sends at most one more.
+ * The page has shown an image, or its edits; until then the server sends at most one more.
  */
 export interface PresentedMessage {
   type: "presented";
@@ -348,7 +348,7 @@ export interface SaveAs {
   overwrite?: boolean;
 }
 /**
- * Changes what holds for all edits.
+ * Change options that hold for all edits.
  */
 export interface SceneChange {
   type: "scene_change";
@@ -393,7 +393,7 @@ export interface Still {
   fov_y_deg: number;
 }
 /**
- * What became of a `drag`: `part` of the operation was followed; `why` where that is less than all.
+ * Result of a `drag`: `part` of the operation was followed; `why` where `part` is below 1.
  */
 export interface Dragged {
   type: "dragged";
@@ -433,7 +433,7 @@ export interface EditState {
   problem: string | null;
 }
 /**
- * The first message: what is being edited. `page` names this page among those that are open.
+ * First message, with the edited scene. `page` identifies this page among the open ones.
  */
 export interface Hello {
   type: "hello";
@@ -477,7 +477,7 @@ export interface Notice {
   text: string;
 }
 /**
- * How much of the renderer is ready: what a machine's first run compiles, later ones load.
+ * Progress of the renderer's kernels: compiled by a machine's first run, loaded by later ones.
  */
 export interface Preparing {
   type: "preparing";
@@ -548,7 +548,7 @@ export interface PictureHeader {
 /**
  * Heads a binary message to a page that draws itself as PictureHeader does; a file of the edits follows.
  *
- * The file is one of `cagefield.pages.page_edits`, without what was sent before, or of
+ * The file is one of `cagefield.pages.page_edits`, without parts that were sent before, or of
  * `cagefield.pages.page_splat_edits`; it is empty where the edits cannot be drawn by a page, and `why`
  * says why. The page answers `presented` when it shows them.
  */
