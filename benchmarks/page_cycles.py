@@ -183,7 +183,7 @@ def editor(page: Page) -> None:
 def exported_page(page: Page) -> None:
     """Waits for the whole picture."""
     until(
-        page, "Boolean(window.cagefieldViewer?.viewer?.renderer.level?.last && cagefieldViewer.viewer.whole)"
+        page, "Boolean(window.cagefieldViewer?.viewer?.renderer?.level?.last && cagefieldViewer.viewer.whole)"
     )
 
 

@@ -37,7 +37,7 @@ from cagefield.scene.scene import Scene
 from editor_page import CHROMIUM, FLAGS, asking
 
 PATIENCE = 300.0
-LEVEL = "window.cagefieldViewer?.viewer?.renderer.level"
+LEVEL = "window.cagefieldViewer?.viewer?.renderer?.level"
 DRAWN = "cagefieldViewer.viewer.whole"
 FIRST = "window.cagefieldViewer?.viewer?.pictures > 0"
 

@@ -62,7 +62,7 @@ def until(page: Any, condition: str, seconds: float = 120.0) -> None:
 
 def settle(page: Any, level: str = "level?.last") -> None:
     """Waits for the whole picture of the full level, or of a level, in `page`, a page or a frame."""
-    until(page, f"Boolean(window.cagefieldViewer?.viewer?.renderer.{level} && cagefieldViewer.viewer.whole)")
+    until(page, f"Boolean(window.cagefieldViewer?.viewer?.renderer?.{level} && cagefieldViewer.viewer.whole)")
     page.evaluate(
         """document.querySelectorAll(".bar, .message, .arrived").forEach(e => e.style.visibility = "hidden")
         || new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"""

@@ -3,15 +3,15 @@ import { bytesOf, Filler, layoutOf, TooLarge } from "../src/field/atlas";
 import { largest } from "../src/field/gl";
 import { joined, summed } from "../src/field/level";
 import type { Level, Vec3 } from "../src/field/level";
-import { Pacing } from "../src/field/adaptive_resolution";
-import { Choice, memoryLimit } from "../src/field/render_location";
+import { AdaptiveResolution } from "../src/field/adaptive_resolution";
+import { memoryLimit, RenderLocation } from "../src/field/render_location";
 import { patched } from "../src/field/page_edits";
 import { indexWith, ownBricks, readLayer } from "../src/field/page_layers";
 import type { Layer } from "../src/field/page_layers";
 import { Places } from "../src/field/layer_offsets";
 import { Stored } from "../src/field/quantized_vertices";
 import { ByteReader, PageFile } from "../src/field/page_file";
-import { SETTLES, Still } from "../src/field/progressive_still";
+import { ProgressiveStill, SETTLE_MS } from "../src/field/progressive_still";
 import { Orbit } from "../src/viewer/orbit";
 import { viewAt } from "../src/viewer/camera_path";
 
@@ -256,64 +256,64 @@ describe("files for pages", () => {
   });
 });
 
-describe("pacing", () => {
-  it("draws smaller pictures where they take longer, and whole ones in parts", () => {
-    const pacing = new Pacing(20, 40);
-    pacing.took(10_000, 1);
-    expect(pacing.scale(200, 100)).toBe(1);
-    expect(pacing.scale(1000, 800)).toBe(0.5);
-    expect(pacing.rows(1000, 800)).toBe(400);
+describe("adaptive resolution", () => {
+  it("draws smaller frames at a higher cost of a pixel, and complete ones in bands", () => {
+    const resolution = new AdaptiveResolution(20, 40);
+    resolution.record(10_000, 1);
+    expect(resolution.scale(200, 100)).toBe(1);
+    expect(resolution.scale(1000, 800)).toBe(0.5);
+    expect(resolution.bandRows(1000, 800)).toBe(400);
   });
 });
 
-describe("a picture at rest", () => {
-  it("begins once nothing has changed for a while, goes down in bands, and begins anew when anything moves", () => {
-    const still = new Still();
-    still.moved(1000, false);
-    expect(still.next(1000 + SETTLES - 1, 100, 60)).toBeNull();
-    const first = still.next(1000 + SETTLES, 100, 60);
+describe("a still frame", () => {
+  it("starts after a time without changes, is drawn in bands, and restarts after a change", () => {
+    const still = new ProgressiveStill();
+    still.restart(1000, false);
+    expect(still.nextBand(1000 + SETTLE_MS - 1, 100, 60)).toBeNull();
+    const first = still.nextBand(1000 + SETTLE_MS, 100, 60);
     expect(first).toEqual({ first: 0, count: 60 });
-    expect(still.drew({ first: 0, count: 60 }, 100)).toBe(false);
-    expect(still.next(1100, 100, 60)).toEqual({ first: 60, count: 40 });
-    still.moved(1101, false);
-    expect(still.next(1101 + SETTLES, 100, 100)).toEqual({ first: 0, count: 100 });
-    expect(still.drew({ first: 0, count: 100 }, 100)).toBe(true);
-    expect([still.whole, still.next(2000, 100, 100)]).toEqual([true, null]);
-    still.moved(3000, true);
-    expect(still.next(4000, 100, 100)).toBeNull();
+    expect(still.finishBand({ first: 0, count: 60 }, 100)).toBe(false);
+    expect(still.nextBand(1100, 100, 60)).toEqual({ first: 60, count: 40 });
+    still.restart(1101, false);
+    expect(still.nextBand(1101 + SETTLE_MS, 100, 100)).toEqual({ first: 0, count: 100 });
+    expect(still.finishBand({ first: 0, count: 100 }, 100)).toBe(true);
+    expect([still.isComplete, still.nextBand(2000, 100, 100)]).toEqual([true, null]);
+    still.restart(3000, true);
+    expect(still.nextBand(4000, 100, 100)).toBeNull();
   });
 });
 
-describe("who draws", () => {
+describe("the render location", () => {
   it("is the page, until it has been measured to be slower than the server", () => {
-    const choice = new Choice();
-    choice.served(10_000, 20, false);
-    for (let n = 0; n < 5; n++) choice.drew(10_000, 80);
-    expect(choice.serverIsFaster).toBe(false);
-    choice.drew(10_000, 80);
-    expect(choice.serverIsFaster).toBe(true);
-    // Pictures of what moves count for more than those at rest.
-    choice.served(10_000, 70, true);
-    choice.served(10_000, 1, false);
-    expect(choice.serverIsFaster).toBe(false);
-    expect(choice.words).toBe(
+    const location = new RenderLocation();
+    location.recordServer(10_000, 20, false);
+    for (let n = 0; n < 5; n++) location.recordPage(10_000, 80);
+    expect(location.serverIsFaster).toBe(false);
+    location.recordPage(10_000, 80);
+    expect(location.serverIsFaster).toBe(true);
+    // From the first moving frame on, still frames do not count.
+    location.recordServer(10_000, 70, true);
+    location.recordServer(10_000, 1, false);
+    expect(location.serverIsFaster).toBe(false);
+    expect(location.summary).toBe(
       "this page 0.13 million pixels a second, the server 0.14 million pixels a second",
     );
   });
 
-  it("draws whole pictures where they take little, and does not change its mind to and fro", () => {
-    const choice = new Choice();
-    expect(choice.whole(1000)).toBe(false);
-    choice.drew(1000, 0.2);
-    expect(choice.whole(1_000_000)).toBe(true);
-    expect(choice.whole(1_400_000)).toBe(true);
-    expect(choice.whole(1_600_000)).toBe(false);
-    expect(choice.whole(1_400_000)).toBe(false);
-    choice.served(1000, 1, true);
-    expect(choice.whole(1_400_000)).toBe(true);
+  it("gives complete frames to the page where they are quick, with hysteresis", () => {
+    const location = new RenderLocation();
+    expect(location.chooseComplete(1000)).toBe(false);
+    location.recordPage(1000, 0.2);
+    expect(location.chooseComplete(1_000_000)).toBe(true);
+    expect(location.chooseComplete(1_400_000)).toBe(true);
+    expect(location.chooseComplete(1_600_000)).toBe(false);
+    expect(location.chooseComplete(1_400_000)).toBe(false);
+    location.recordServer(1000, 1, true);
+    expect(location.chooseComplete(1_400_000)).toBe(true);
   });
 
-  it("takes memory as the device has it", () => {
+  it("limits the memory by that of the device", () => {
     expect([undefined, 0.25, 2, 8].map((gib) => memoryLimit(gib) / 2 ** 20)).toEqual([768, 96, 256, 768]);
   });
 });

@@ -1,37 +1,11 @@
-import { afterEach, beforeEach, expect, it, vi } from "vitest";
-import { ownHeader } from "../src/frames/frame_state";
-import { Presenter } from "../src/frames/frame_pacing";
+import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import { Store } from "../src/app/store";
-import type { App } from "../src/app/app";
-import type { TakenEdits } from "../src/frames/page_scene";
-import type { PictureHeader } from "../src/net/protocol";
+import { FramePacer } from "../src/frames/frame_pacing";
+import type { PacerHost } from "../src/frames/frame_pacing";
+import type { Hello, PictureHeader } from "../src/net/protocol";
+import { PICTURE } from "./headers";
 
-const HEADER: PictureHeader = {
-  type: "picture",
-  picture: 7,
-  camera: 3,
-  drag: 0,
-  seq: 0,
-  revision: 1,
-  view: "colour",
-  before: false,
-  split: null,
-  x: 0,
-  y: 0,
-  width: 1,
-  height: 1,
-  full_width: 1,
-  full_height: 1,
-  final: true,
-  format: "rgb",
-  picture_bytes: 3,
-  depth_bytes: 2,
-  depth_width: 1,
-  depth_height: 1,
-  depth_scale: 1,
-  render_ms: 60,
-  encode_ms: 1,
-};
+const FRAME_MS = 16;
 
 beforeEach(() => {
   vi.useFakeTimers();
@@ -53,51 +27,140 @@ afterEach(() => {
   vi.unstubAllGlobals();
 });
 
-it("says of a picture that came too late that the next may come, and shows the figures of the page's own", async () => {
+/** A pacer, the messages it sends, and the calls of its host. */
+function pacing() {
   const store = new Store();
-  const [send, show, served] = [vi.fn(), vi.fn(), vi.fn()];
-  let late = true;
-  const frames: ((time: number) => void)[] = [];
-  const app = {
+  const [send, show, say, recordServerFrame, orbitAt] = [vi.fn(), vi.fn(), vi.fn(), vi.fn(), vi.fn()];
+  const guessed: (() => void)[] = [];
+  const afterFrame: ((time: number) => void)[] = [];
+  const facts = {
+    superseded: false,
+    dragging: false,
+    camera: 3,
+    position: [9, 9, 9],
+    depth: 2 as number | null,
+  };
+  const host = {
     store,
     send,
-    drag: null,
-    viewport: { guessed: [], afterFrame: frames, frameTime: 16, invalidate: vi.fn() },
-    page: { served, outdates: () => late },
-    pictures: { show },
-    camera: { viewpoint: () => null, seq: 3 },
-  } as unknown as App;
-  const presenter = new Presenter(app);
-  const frame = (): void => {
-    presenter.askForMore();
-    frames.forEach((framed) => framed(performance.now()));
-    vi.advanceTimersByTime(1000);
+    say,
+    recordServerFrame,
+    supersedes: () => facts.superseded,
+    isDragging: () => facts.dragging,
+    viewport: {
+      guessed,
+      afterFrame,
+      frameTime: FRAME_MS,
+      invalidate: vi.fn(),
+      orbitAt,
+      camera: { position: { toArray: () => facts.position } },
+    },
+    pictures: { show, depth: { at: () => facts.depth } },
+    camera: {
+      viewpoint: () => null,
+      get seq() {
+        return facts.camera;
+      },
+    },
   };
-  presenter.drew({ ...HEADER, picture: 0, final: false, render_ms: 5 }, 0, 0);
-  frame();
-  presenter.take(new ArrayBuffer(5), HEADER, 0);
-  await vi.waitFor(() => expect(served).toHaveBeenCalled());
-  frame();
-  expect(send.mock.calls).toEqual([[{ type: "presented", picture: 7 }]]);
-  expect([store.now.figures.page, store.now.figures.renderMs, presenter.last?.picture]).toEqual([true, 5, 0]);
-  expect(show).not.toHaveBeenCalled();
-  late = false;
-  presenter.take(new ArrayBuffer(5), { ...HEADER, picture: 8 }, 0);
-  await vi.waitFor(() => expect(show).toHaveBeenCalled());
-  frame();
-  expect([store.now.figures.page, store.now.figures.renderMs, presenter.last?.picture]).toEqual([
-    false,
-    60,
-    8,
-  ]);
-});
+  const pacer = new FramePacer(host as unknown as PacerHost);
+  return {
+    store,
+    send,
+    show,
+    say,
+    recordServerFrame,
+    orbitAt,
+    guessed,
+    facts,
+    pacer,
+    /** Redraws the canvas: requests the next frames, then the drawn ones are on the screen. */
+    redraw: (milliseconds = 1000): void => {
+      pacer.requestNext();
+      afterFrame.forEach((finish) => finish(performance.now()));
+      vi.advanceTimersByTime(milliseconds);
+    },
+    /** Delivers a frame of the server, and waits until it is decoded. */
+    deliver: async (header: PictureHeader): Promise<void> => {
+      const before = recordServerFrame.mock.calls.length;
+      pacer.take(new ArrayBuffer(5), header, 0);
+      await vi.waitFor(() => expect(recordServerFrame.mock.calls.length).toBe(before + 1));
+    },
+  };
+}
 
-it("calls a whole picture of the page's own final once its edits are", () => {
-  const app = { store: new Store(), camera: { seq: 3 } } as unknown as App;
-  const taken = (final: boolean): TakenEdits =>
-    ({ header: { drag: 0, seq: 0, revision: 2, final }, received: 0, taken: 0 }) as unknown as TakenEdits;
-  const finals = [taken(true), taken(false), null].flatMap((edits) =>
-    [true, false].map((whole) => ownHeader(app, edits, [4, 2], whole, 1).final),
-  );
-  expect(finals).toEqual([true, false, false, false, false, false]);
+describe("frame pacing", () => {
+  it("acknowledges a superseded frame, and shows the figures of the page's own", async () => {
+    const { pacer, facts, store, send, show, redraw, deliver } = pacing();
+    facts.superseded = true;
+    pacer.add({ ...PICTURE, picture: 0, final: false, render_ms: 5 }, 0, 0);
+    redraw();
+    await deliver(PICTURE);
+    redraw();
+    expect(send.mock.calls).toEqual([[{ type: "presented", picture: 7 }]]);
+    expect([store.now.figures.page, store.now.figures.renderMs, pacer.last?.picture]).toEqual([true, 5, 0]);
+    expect(show).not.toHaveBeenCalled();
+    facts.superseded = false;
+    await deliver({ ...PICTURE, picture: 8 });
+    redraw();
+    expect(show).toHaveBeenCalledOnce();
+    expect([store.now.figures.page, store.now.figures.renderMs, pacer.last?.picture]).toEqual([false, 60, 8]);
+  });
+
+  it("requests a drag's next frame half a frame later, after the actions before a request", async () => {
+    const { pacer, facts, send, redraw, deliver } = pacing();
+    const order: string[] = [];
+    pacer.beforeRequest.push(() => order.push("action"));
+    send.mockImplementation(() => order.push("presented"));
+    facts.dragging = true;
+    await deliver(PICTURE);
+    redraw(0.5 * FRAME_MS - 1);
+    expect(order).toEqual([]);
+    vi.advanceTimersByTime(1);
+    expect(order).toEqual(["action", "presented"]);
+  });
+
+  it("requests at once where edits are acknowledged, and each number once", () => {
+    const { pacer, facts, send, redraw } = pacing();
+    facts.dragging = true;
+    pacer.acknowledge([4, 5]);
+    redraw(0);
+    redraw(1000);
+    expect(send.mock.calls).toEqual([
+      [{ type: "presented", picture: 4 }],
+      [{ type: "presented", picture: 5 }],
+    ]);
+  });
+
+  it("reports a frame that cannot be decoded, and requests the next", async () => {
+    const { pacer, send, say, show } = pacing();
+    vi.stubGlobal("createImageBitmap", () => Promise.reject(new Error("not a JPEG")));
+    pacer.take(new ArrayBuffer(5), { ...PICTURE, format: "jpeg" }, 0);
+    await vi.waitFor(() => expect(say).toHaveBeenCalledOnce());
+    expect(send.mock.calls).toEqual([[{ type: "presented", picture: 7 }]]);
+    expect(show).not.toHaveBeenCalled();
+  });
+
+  it("takes the orbit's center from the depth of the next frame, only inside the field", async () => {
+    const { guessed, facts, store, orbitAt, deliver } = pacing();
+    const bounds = [
+      [0, 0, 0],
+      [1, 1, 1],
+    ];
+    store.set({ hello: { bounds } as Hello });
+    const frame = async (camera: number): Promise<void> => {
+      facts.camera = camera;
+      await deliver({ ...PICTURE, camera });
+    };
+    guessed.forEach((call) => call());
+    await frame(4);
+    expect(orbitAt).not.toHaveBeenCalled();
+    facts.position = [0.5, 0.5, 0.5];
+    guessed.forEach((call) => call());
+    await deliver({ ...PICTURE, camera: 4 });
+    expect(orbitAt).not.toHaveBeenCalled();
+    await frame(5);
+    await frame(6);
+    expect(orbitAt.mock.calls).toEqual([[2]]);
+  });
 });

@@ -37,27 +37,27 @@ function moved(by: number): ReturnType<typeof cagesOf> {
 it("asks one question at a time, and keeps the old lines until there are new ones", async () => {
   const waiting: ((found: Answer | null) => void)[] = [];
   const grid = new Grid(() => new Promise((resolve) => waiting.push(resolve)), vi.fn());
-  expect(grid.of(edit(), moved(0))).toEqual([]);
-  for (const by of [0.1, 0.2, 0.3]) grid.of(edit(), moved(by));
+  expect(grid.linesFor(edit(), moved(0))).toEqual([]);
+  for (const by of [0.1, 0.2, 0.3]) grid.linesFor(edit(), moved(by));
   expect(waiting).toHaveLength(1);
   waiting[0](answer(LINE));
   await vi.advanceTimersByTimeAsync(0);
-  expect(grid.of(edit(), moved(0.3))).toEqual(LINE);
+  expect(grid.linesFor(edit(), moved(0.3))).toEqual(LINE);
   expect(waiting).toHaveLength(1);
   await vi.advanceTimersByTimeAsync(200);
-  expect(grid.of(edit(), moved(0.3))).toEqual(LINE);
+  expect(grid.linesFor(edit(), moved(0.3))).toEqual(LINE);
   expect(waiting).toHaveLength(2);
   waiting[1](null);
   await vi.advanceTimersByTimeAsync(200);
-  expect(grid.of(edit(), moved(0.3))).toEqual(LINE);
+  expect(grid.linesFor(edit(), moved(0.3))).toEqual(LINE);
   expect(waiting).toHaveLength(2);
 });
 
 it("shows no other edit's lines, and none of what has no shell", async () => {
   const grid = new Grid(() => Promise.resolve(answer(LINE)), vi.fn());
-  grid.of(edit(), moved(0));
+  grid.linesFor(edit(), moved(0));
   await vi.advanceTimersByTimeAsync(200);
-  expect(grid.of(edit(), moved(0))).toEqual(LINE);
-  expect(grid.of(edit({ kind: "copy" }), moved(0))).toEqual([]);
-  expect(grid.of(edit({ id: 2 }), moved(0))).toEqual([]);
+  expect(grid.linesFor(edit(), moved(0))).toEqual(LINE);
+  expect(grid.linesFor(edit({ kind: "copy" }), moved(0))).toEqual([]);
+  expect(grid.linesFor(edit({ id: 2 }), moved(0))).toEqual([]);
 });

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { DepthImage } from "../src/frames/depth_image";
 import type { PictureHeader } from "../src/net/protocol";
-import { headed, pack, unpack } from "../src/frames/picture_message";
+import { readHeader, pack, unpack } from "../src/frames/picture_message";
 
 const HEADER: PictureHeader = {
   type: "picture",
@@ -34,11 +34,11 @@ describe("a binary message", () => {
   it("comes apart into what it was made of", () => {
     const depth = new Uint16Array([1, 2, 3, 4, 5, 6, 7, 65535]);
     const message = pack(HEADER, new Uint8Array([9, 8, 7]), depth);
-    const { header, start } = headed(message);
+    const { header, start } = readHeader(message);
     expect(header).toEqual(HEADER);
-    const parcel = unpack(message, HEADER, start);
-    expect([...parcel.picture]).toEqual([9, 8, 7]);
-    expect([...parcel.depth]).toEqual([...depth]);
+    const parts = unpack(message, HEADER, start);
+    expect([...parts.picture]).toEqual([9, 8, 7]);
+    expect([...parts.depth]).toEqual([...depth]);
   });
 });
 

@@ -125,11 +125,11 @@ describe("the player", () => {
     const page = new FakePage();
     await page.begin();
     page.frame(0);
-    page.player.told({ type: "preview", page: 3, play: 1, on: true });
-    page.player.told({ type: "preview", page: 2, play: 1, on: false });
-    page.player.told({ type: "preview", page: 3, play: 9, on: false });
+    page.player.takePreview({ type: "preview", page: 3, play: 1, on: true });
+    page.player.takePreview({ type: "preview", page: 2, play: 1, on: false });
+    page.player.takePreview({ type: "preview", page: 3, play: 9, on: false });
     expect(page.player.playing).toBe(true);
-    page.player.told({ type: "preview", page: 3, play: 1, on: false });
+    page.player.takePreview({ type: "preview", page: 3, play: 1, on: false });
     expect(page.player.playing).toBe(false);
   });
 

@@ -1,23 +1,21 @@
-/** The page's parts put together: what arrives is taken in, what is to be seen is drawn. */
+/** The editor: its parts, connected to each other, to the server's messages and to the canvas. */
 import { Vector3 } from "three";
 import { middle } from "../editing/cage";
-import { CameraFeed } from "../frames/camera_feed";
-import { Connection, socketAddress } from "../net/connection";
+import { cageOverlay, shownCages } from "../editing/cage_overlay";
 import { Drag, leading } from "../editing/drag";
 import { Gizmo } from "../editing/gizmo";
 import { Grid } from "../editing/grid";
 import { Handles } from "../editing/handles";
 import { Lines } from "../editing/lines";
-import { PageRenderer } from "../frames/page_renderer";
-import { Pictures } from "../frames/pictures";
-import { Player } from "./player";
-import { Presenter } from "../frames/frame_pacing";
-import { recallCamera, recallTools } from "./session_storage";
-import { cageOverlay, shownCages } from "../editing/cage_overlay";
-import { Viewport } from "../frames/viewport";
-import { LOOKING, Store, maySay, obstacle, selected, showsCages, target } from "./store";
-import { headed } from "../frames/picture_message";
 import type { Operation } from "../editing/operations";
+import { memoryLimit } from "../field/render_location";
+import { CameraFeed } from "../frames/camera_feed";
+import { FramePacer } from "../frames/frame_pacing";
+import { PageRenderer, renderRequest } from "../frames/page_renderer";
+import { readHeader } from "../frames/picture_message";
+import { Pictures } from "../frames/pictures";
+import { Viewport } from "../frames/viewport";
+import { Connection, socketAddress } from "../net/connection";
 import type {
   Answer,
   Ask,
@@ -30,9 +28,13 @@ import type {
   State,
   Vec3,
 } from "../net/protocol";
+import { createDrawer } from "../splats/drawer_selection";
+import { Player } from "./player";
+import { recallCamera, recallTools } from "./session_storage";
+import { LOOKING, Store, maySay, obstacle, selected, showsCages, target } from "./store";
 
-/** What of the page's state shows in the canvas. */
-const DRAWN = [
+/** Values of the store whose change redraws the canvas. */
+const CANVAS_KEYS = [
   "state",
   "mode",
   "tool",
@@ -49,6 +51,9 @@ const DRAWN = [
   "preview",
 ] as const;
 
+/** Tolerance with which lines count as hidden, in voxels. */
+const LINE_SLACK_VOXELS = 1.5;
+
 export class App {
   readonly store = new Store(recallTools());
   readonly viewport: Viewport;
@@ -56,48 +61,70 @@ export class App {
   readonly gizmo: Gizmo;
   readonly camera: CameraFeed;
   readonly player: Player;
-  readonly presenter: Presenter;
+  readonly frames: FramePacer;
   readonly page: PageRenderer;
   drag: Drag | null = null;
   private readonly lines: Lines;
   private readonly handles: Handles;
   private readonly connection: Connection;
   private readonly grid: Grid;
+  /** Callbacks of the questions without an answer yet, by the number of the request. */
   private readonly questions = new Map<number, (answer: Answer | null) => void>();
   private requests = 0;
   private drags = 0;
-  private placedAfter: number | null = null;
+  /** The highest id of an edit before a new edit was requested; null without such a request. */
+  private lastEditId: number | null = null;
+
   constructor(host: HTMLElement) {
     this.viewport = new Viewport(host);
     this.pictures = new Pictures(this.viewport);
     this.lines = new Lines(this.viewport, this.pictures);
     this.handles = new Handles(this.viewport);
     this.gizmo = new Gizmo(this.viewport.scene, this.viewport.camera);
-    this.camera = new CameraFeed(this.viewport, (message) => this.send(message));
+    const { store, viewport, pictures } = this;
+    const send = (message: PageMessage): boolean => this.send(message);
+    const say = (text: string, level: "warning"): void => this.say(text, level);
+    const camera = (this.camera = new CameraFeed(viewport, send));
     this.grid = new Grid(
       (edit) => this.ask({ what: "grid", edit }),
-      () => this.viewport.invalidate(),
+      () => viewport.invalidate(),
     );
     this.player = new Player(this);
-    this.presenter = new Presenter(this);
-    this.page = new PageRenderer(this);
-    this.camera.drawnHere = () => this.page.draws;
-    this.viewport.beforeFrame.push(() => this.arrange());
-    this.viewport.beforeFrame.push(() => this.presenter.askForMore());
-    this.store.listen((now, before) => {
+    this.frames = new FramePacer({
+      store,
+      viewport,
+      pictures,
+      camera,
+      send,
+      say,
+      isDragging: () => this.drag !== null,
+      recordServerFrame: (header) => this.page.recordServerFrame(header),
+      supersedes: (header) => this.page.supersedes(header),
+    });
+    const gl = viewport.renderer.getContext() as WebGL2RenderingContext;
+    const memory = memoryLimit((navigator as { deviceMemory?: number }).deviceMemory);
+    this.page = new PageRenderer(
+      { store, viewport, pictures, camera, frames: this.frames, send, say },
+      renderRequest(location.search),
+      (kind) => createDrawer(kind, gl, memory),
+    );
+    camera.drawnHere = () => this.page.draws;
+    viewport.beforeFrame.push(() => this.arrange());
+    viewport.beforeFrame.push(() => this.frames.requestNext());
+    store.listen((now, before) => {
       if (now.view !== before.view || now.before !== before.before || now.split !== before.split)
-        this.sendLook();
-      if (DRAWN.some((key) => now[key] !== before[key])) this.viewport.invalidate();
+        this.sendView();
+      if (CANVAS_KEYS.some((key) => now[key] !== before[key])) viewport.invalidate();
     });
     this.connection = new Connection(() => new WebSocket(socketAddress(location)), {
-      opened: () => this.store.set({ connection: "open" }),
-      lost: () => this.lost(),
+      opened: () => store.set({ connection: "open" }),
+      lost: () => this.handleLoss(),
       message: (message) => this.take(message),
       binary: (bytes) => this.takeBinary(bytes),
     });
   }
 
-  /** Sends a message; false where nobody is there, or where the page may not say it. */
+  /** Sends a message; false without a connection, or if the page may not send it. */
   send(message: PageMessage): boolean {
     if (!maySay(this.store.now, message)) {
       this.say(LOOKING, "warning");
@@ -106,7 +133,7 @@ export class App {
     return this.connection.send(message);
   }
 
-  /** The server's answer; null, and a line says why, where it has none or is not there. */
+  /** The server's answer to a question; null if the question fails (a notice says why) or the connection is lost. */
   ask(question: Omit<Ask, "type" | "request">): Promise<Answer | null> {
     const request = ++this.requests;
     return new Promise((resolve) => {
@@ -119,8 +146,8 @@ export class App {
     this.store.set({ notice: { type: "notice", level, text } });
   }
 
-  /** Begins a drag of the selected edit; null, and why, where it cannot be dragged. */
-  beginDrag(what = target(this.store.now)): Drag | null {
+  /** Begins a drag of the selected edit; null if the edit cannot be dragged, and a notice says why. */
+  beginDrag(dragged = target(this.store.now)): Drag | null {
     const edit = selected(this.store.now);
     if (edit === null || this.store.now.connection !== "open") return null;
     const why = obstacle(this.store.now, edit);
@@ -129,16 +156,16 @@ export class App {
       return null;
     }
     this.drags += 1;
-    this.drag = new Drag(this.drags, edit, what, (message) => this.send(message));
+    this.drag = new Drag(this.drags, edit, dragged, (message) => this.send(message));
     this.store.set({ limit: null });
     return this.drag;
   }
 
-  /** Moves the drag on; `time` is when the mouse moved. */
+  /** Moves the drag on; `time` is the time of the mouse event. */
   moveDrag(operation: Operation, time: number): void {
     if (this.drag === null) return;
     this.drag.move(operation);
-    this.presenter.latency.moved(this.drag.id, this.drag.seq, time);
+    this.frames.latency.moved(this.drag.id, this.drag.seq, time);
     this.store.set({ limit: this.drag.why });
     this.viewport.invalidate();
   }
@@ -155,46 +182,47 @@ export class App {
     this.viewport.invalidate();
   }
 
-  /** After a new edit was asked for: Set mode, as soon as it is there. */
+  /** Switches to Set mode as soon as the requested new edit arrives. */
   expectEdit(): void {
-    this.placedAfter = Math.max(0, ...(this.store.now.state?.edits.map((edit) => edit.id) ?? []));
+    this.lastEditId = Math.max(0, ...(this.store.now.state?.edits.map((edit) => edit.id) ?? []));
   }
 
-  /** Where the gizmo stands: on a pivot, or between the corners that were chosen. */
-  get gizmoAt(): Vector3 | null {
+  /** Position of the gizmo between the chosen corners; null without chosen corners, where the pivot is the position. */
+  get gizmoPosition(): Vector3 | null {
     const { now } = this.store;
     const edit = selected(now);
     if (edit === null || now.corners.length === 0) return null;
     return new Vector3(...middle(leading(shownCages(edit, this.drag), target(now)).corners, now.corners));
   }
 
-  /** Puts lines, handles and the gizmo where they belong now. */
+  /** Updates lines, handles and the gizmo. */
   arrange(): void {
     const { now } = this.store;
     const edit = selected(now);
     const eye = this.viewport.camera.position.toArray();
-    const grid = now.grid && edit !== null ? this.grid.of(edit, shownCages(edit, this.drag)) : [];
+    const grid = now.grid && edit !== null ? this.grid.linesFor(edit, shownCages(edit, this.drag)) : [];
     const { segments, dots } = cageOverlay(now, this.drag, grid, eye);
     this.lines.set(segments);
     this.handles.set(dots);
-    if (
-      edit === null ||
-      !showsCages(now) ||
-      obstacle(now, edit) !== null ||
-      (now.tool === "select" && now.corners.length === 0)
-    ) {
+    const hasGizmo = now.tool !== "select" || now.corners.length > 0;
+    if (edit === null || !showsCages(now) || obstacle(now, edit) !== null || !hasGizmo) {
       this.gizmo.hide();
       return;
     }
     const cage = leading(shownCages(edit, this.drag), target(now));
-    if (this.gizmo.dragging) this.gizmo.settle(this.gizmoAt ?? new Vector3(...cage.pivot));
-    else this.gizmo.show(now.tool, now.axes, cage, this.gizmoAt);
+    if (this.gizmo.dragging) this.gizmo.settle(this.gizmoPosition ?? new Vector3(...cage.pivot));
+    else this.gizmo.show(now.tool, now.axes, cage, this.gizmoPosition);
+  }
+
+  /** The cages of an edit as they are drawn, a drag in progress included. */
+  shownCages(edit: EditState): ReturnType<typeof shownCages> {
+    return shownCages(edit, this.drag);
   }
 
   private take(message: ServerMessage): void {
     switch (message.type) {
       case "hello":
-        this.greeted(message);
+        this.takeHello(message);
         break;
       case "state":
         this.takeState(message);
@@ -222,37 +250,38 @@ export class App {
     }
   }
 
-  private greeted(hello: Hello): void {
+  private takeHello(hello: Hello): void {
     const before = this.store.now.hello;
-    const another = before !== null && before.scene !== hello.scene;
-    this.store.set(another ? { hello, state: null, corners: [], hover: null, jobs: [] } : { hello });
-    this.lines.slack = 1.5 * hello.voxel;
-    if (before === null || another) {
+    const isOtherScene = before !== null && before.scene !== hello.scene;
+    this.store.set(isOtherScene ? { hello, state: null, corners: [], hover: null, jobs: [] } : { hello });
+    this.lines.slack = LINE_SLACK_VOXELS * hello.voxel;
+    if (before === null || isOtherScene) {
       const [low, high] = hello.bounds;
-      const around = low.map((x, i) => 0.5 * (x + high[i])) as Vec3;
-      const recalled = another ? null : recallCamera();
-      this.viewport.lookFrom(recalled ?? hello.start.c2w, hello.start.fov_y_deg, hello.up, around);
+      const center = low.map((x, i) => 0.5 * (x + high[i])) as Vec3;
+      const c2w = (isOtherScene ? null : recallCamera()) ?? hello.start.c2w;
+      this.viewport.lookFrom(c2w, hello.start.fov_y_deg, hello.up, center);
     }
     this.camera.restate();
-    this.sendLook();
+    this.sendView();
   }
 
   private takeState(state: State): void {
-    this.presenter.news = performance.now();
-    const placed = state.edits.find((edit) => this.placedAfter !== null && edit.id > this.placedAfter);
+    const { lastEditId } = this;
+    this.frames.lastNews = performance.now();
+    const isExpected = lastEditId !== null && state.edits.some((edit) => edit.id > lastEditId);
     if (this.drag?.ended) {
       this.drag = null;
       this.store.set({ limit: null });
     }
-    const other = state.selected !== this.store.now.state?.selected;
-    this.store.set({ state, ...(other ? { corners: [], hover: null } : {}) });
-    if (placed) {
-      this.placedAfter = null;
+    const isOther = state.selected !== this.store.now.state?.selected;
+    this.store.set({ state, ...(isOther ? { corners: [], hover: null } : {}) });
+    if (isExpected) {
+      this.lastEditId = null;
       this.store.set({ mode: "set", cage: "inner" });
     }
   }
 
-  /** Shows how far a job is; a file that this page asked for is downloaded when it is there. */
+  /** Shows the progress of a job, and downloads the finished file of a job that this page started. */
   private takeJob(job: Job): void {
     this.store.set({ jobs: [...this.store.now.jobs.filter((other) => other.job !== job.job), job] });
     if (job.what !== "splats" || job.state !== "done" || job.page !== this.store.now.hello?.page) return;
@@ -266,33 +295,28 @@ export class App {
     const { preview: shown } = this.store.now;
     if (preview.on) this.store.set({ preview });
     else if (shown?.page === preview.page && shown.play === preview.play) this.store.set({ preview: null });
-    this.player.told(preview);
+    this.player.takePreview(preview);
   }
 
-  private lost(): void {
-    const dragging = this.drag !== null;
+  private takeBinary(message: ArrayBuffer): void {
+    const { header, start } = readHeader(message);
+    if (header.type === "edits") this.page.takeEdits(header, message.slice(start));
+    else this.frames.take(message, header, start);
+  }
+
+  private handleLoss(): void {
+    const wasDragging = this.drag !== null;
     this.drag = null;
     for (const resolve of this.questions.values()) resolve(null);
     this.questions.clear();
-    this.grid.forget();
+    this.grid.clear();
     this.store.set({ connection: "lost", limit: null, preview: null });
-    if (dragging) this.say("the server went away in the middle of a drag, which is lost", "warning");
+    if (wasDragging) this.say("the connection was lost during a drag; the drag is undone", "warning");
     this.viewport.invalidate();
   }
 
-  private sendLook(): void {
+  private sendView(): void {
     const { view, before, split } = this.store.now;
     this.send({ type: "display", view, before, split });
-  }
-
-  private takeBinary(bytes: ArrayBuffer): void {
-    const { header, start } = headed(bytes);
-    if (header.type === "edits") this.page.take(header, bytes.slice(start));
-    else this.presenter.take(bytes, header, start);
-  }
-
-  /** The cages of an edit as they are shown now. */
-  shown(edit: EditState): ReturnType<typeof shownCages> {
-    return shownCages(edit, this.drag);
   }
 }

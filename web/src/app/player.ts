@@ -1,16 +1,16 @@
-/** Plays the camera path: moves the page's camera, and has pictures show the edits as the video will. */
+/** Playback of the camera path: the page's camera follows the path, and frames show the edits as the video does. */
 import { duration, stillAt } from "./camera_path";
 import type { Ask, Answer, PageMessage, Preview, Still } from "../net/protocol";
 import type { Store } from "./store";
 
-/** What of the page the player needs. */
+/** The parts of the editor that the player uses. */
 export interface Playable {
   readonly store: Store;
   send(message: PageMessage): boolean;
   ask(question: Omit<Ask, "type" | "request">): Promise<Answer | null>;
   readonly viewport: {
     beforeFrame: (() => void)[];
-    /** Called when the user takes hold of the view. */
+    /** Called when the user begins to turn the view. */
     taken: (() => void)[];
     invalidate(): void;
     pose(c2w: readonly number[], fov_y_deg: number): void;
@@ -19,21 +19,22 @@ export interface Playable {
   };
 }
 
-/** What is played: the stills, how long they take, and since when. */
+/** A playback in progress. */
 interface Run {
   play: number;
   stills: Still[];
-  whole: number;
+  /** Duration of the path in seconds. */
+  duration: number;
   loop: boolean;
-  /** When its first frame was drawn; null before. */
+  /** Time of the first frame, in ms; null before it. */
   started: number | null;
 }
 
 export class Player {
-  /** Called when it begins, and when it stops. */
+  /** Called when a playback begins, and when it stops. */
   changed: (on: boolean) => void = () => undefined;
   private plays = 0;
-  /** The number of what was asked for and is not played yet. */
+  /** The number of the playback whose stills were requested and have not arrived. */
   private expected: number | null = null;
   private run: Run | null = null;
 
@@ -41,7 +42,7 @@ export class Player {
     private readonly app: Playable,
     private readonly now: () => number = () => performance.now(),
   ) {
-    // First of all: the camera is told, and drawn, as it is set here.
+    // The first action of a frame: the camera is sent and drawn in the pose that is set here.
     app.viewport.beforeFrame.unshift(() => this.frame());
     app.viewport.taken.push(() => this.stop());
     app.store.watch(["connection"], ({ connection }) => {
@@ -69,8 +70,8 @@ export class Player {
     this.changed(false);
   }
 
-  /** The server says that a preview has begun or is over; where it is this one, the player stops. */
-  told({ page, play, on }: Preview): void {
+  /** Stops the playback if the server has ended its preview. */
+  takePreview({ page, play, on }: Preview): void {
     if (!on && page === this.app.store.now.hello?.page && play === this.run?.play) this.stop();
   }
 
@@ -86,8 +87,8 @@ export class Player {
       return;
     }
     this.expected = null;
-    const whole = duration(state.keys, state.loop);
-    this.run = { play, stills: answer.stills, whole, loop: state.loop, started: null };
+    const { keys, loop } = state;
+    this.run = { play, stills: answer.stills, duration: duration(keys, loop), loop, started: null };
     this.app.viewport.invalidate();
   }
 
@@ -95,12 +96,12 @@ export class Player {
     const { run } = this;
     if (run === null) return;
     run.started ??= this.now();
-    const since = (this.now() - run.started) / 1000;
-    const seconds = run.loop ? since % run.whole : Math.min(since, run.whole);
-    const { c2w, fov_y_deg } = stillAt(run.stills, seconds / run.whole);
+    const elapsed = (this.now() - run.started) / 1000;
+    const seconds = run.loop ? elapsed % run.duration : Math.min(elapsed, run.duration);
+    const { c2w, fov_y_deg } = stillAt(run.stills, seconds / run.duration);
     this.app.send({ type: "play", play: run.play, seconds });
     this.app.viewport.pose(c2w, fov_y_deg);
-    if (!run.loop && since >= run.whole) this.stop();
+    if (!run.loop && elapsed >= run.duration) this.stop();
     else this.app.viewport.invalidate();
   }
 }

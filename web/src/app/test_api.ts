@@ -1,4 +1,4 @@
-/** `window.cagefield`: what tests and measurements may read of the page. */
+/** `window.cagefield`: state of the page for tests and measurements. */
 import { cornersOf, middle, type Part } from "../editing/cage";
 import type { App } from "./app";
 import type { Latency } from "../frames/latency";
@@ -12,20 +12,20 @@ export interface TestApi {
   readonly now: Editor;
   readonly picture: PictureHeader | null;
   readonly latency: Latency;
-  /** What the page's own GPU does: see `PageRenderer`. */
+  /** State of rendering by the page's own GPU: see `PageRenderer`. */
   readonly page: {
     drawn: number;
     why: string | null;
     draws: boolean;
     here: DrawnHere;
-    /** How often the field was loaded. */
+    /** Number of loads of the field. */
     loads: number;
-    /** Bytes of edits that were uploaded, the last time and in all. */
+    /** Bytes of edits uploaded to the GPU, by the last change and by all. */
     uploaded: { last: number; total: number };
     rates: string;
   };
   readonly camera: { c2w: number[]; seq: number };
-  /** The drag that goes on: what the cages follow of it, and why not all. */
+  /** The drag in progress: the operation that the cages follow, and the reason if that is not all of it. */
   readonly drag: {
     id: number;
     seq: number;
@@ -33,22 +33,22 @@ export interface TestApi {
     why: string | null;
     followed: Operation | null;
   } | null;
-  /** Whether the last picture is final and shows what is to be seen: the camera, the view, the edits, no drag, no preview. */
+  /** Whether the last frame is final and shows the current camera, view and edits, without a drag or a preview. */
   readonly settled: boolean;
-  /** Milliseconds since a picture or a state came. */
+  /** Milliseconds since the last frame or state. */
   readonly quiet: number;
-  /** A part of a cage, as it is shown, in CSS pixels of the window. */
+  /** Position of a part of a drawn cage, in CSS pixels of the window. */
   screen(
     edit: number,
     kind: Part["kind"],
     index: number,
     cage?: "inner" | "deformed" | "outer",
   ): { x: number; y: number };
-  /** Where to take hold of the gizmo's handle ("X", "XY", "XYZ", ...), in CSS pixels of the window. */
+  /** Position where the gizmo's handle ("X", "XY", "XYZ", ...) can be grabbed, in CSS pixels of the window. */
   grip(axis: string): { x: number; y: number } | null;
-  /** A point of space in CSS pixels of the window. */
+  /** Position of a world point, in CSS pixels of the window. */
   project(point: [number, number, number]): { x: number; y: number };
-  /** Distance along the ray at a CSS pixel of the window; null where there is nothing. */
+  /** Distance along the ray of a CSS pixel of the window; null where the ray hits nothing. */
   depth(x: number, y: number): number | null;
 }
 
@@ -69,19 +69,19 @@ export function testApi(app: App): TestApi {
       return app.store.now;
     },
     get picture() {
-      return app.presenter.last;
+      return app.frames.last;
     },
-    latency: app.presenter.latency,
+    latency: app.frames.latency,
     get page() {
-      const { drawn, why, draws, here, scene, drawer, choice } = app.page;
+      const { drawn, why, draws, here, scene, uploaded, location } = app.page;
       return {
         drawn,
         why,
         draws,
         here,
         loads: scene.loads,
-        uploaded: { ...drawer.uploaded },
-        rates: choice.words,
+        uploaded: { ...uploaded },
+        rates: location.summary,
       };
     },
     get camera() {
@@ -93,7 +93,7 @@ export function testApi(app: App): TestApi {
       return { id, seq, ended, why, followed };
     },
     get settled() {
-      const picture = app.presenter.last;
+      const picture = app.frames.last;
       const { state, view, before, split, preview } = app.store.now;
       if (app.drag !== null || preview !== null || picture === null || state === null || !app.camera.resting)
         return false;
@@ -104,11 +104,11 @@ export function testApi(app: App): TestApi {
       );
     },
     get quiet() {
-      return performance.now() - app.presenter.news;
+      return performance.now() - app.frames.lastNews;
     },
     screen(id, kind, index, cage = "deformed") {
       const edit = app.store.now.state?.edits.find((each) => each.id === id);
-      const posed = edit && app.shown(edit)[cage];
+      const posed = edit && app.shownCages(edit)[cage];
       if (!posed) throw new Error(`edit ${id} has no ${cage} cage`);
       const { x, y } = viewport.project(middle(posed.corners, cornersOf({ kind, index })));
       return inWindow(x, y);
@@ -121,7 +121,7 @@ export function testApi(app: App): TestApi {
         (0.5 - 0.5 * at.y) * height,
       ];
       const edit = selected(app.store.now);
-      const cages = edit === null ? [] : draggable(app.store.now, app.shown(edit));
+      const cages = edit === null ? [] : draggable(app.store.now, app.shownCages(edit));
       const slack = { x: 4 / width, y: 4 / height };
       const at = app.gizmo.grip(axis, slack, (device) =>
         cages.every(({ corners }) => pickCorner(...pixel(device), corners, viewport.project) === null),

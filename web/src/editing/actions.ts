@@ -149,7 +149,7 @@ export class Actions {
   focus(x: number, y: number): void {
     const edit = selected(this.app.store.now);
     if (edit !== null) {
-      const { corners } = leading(this.app.shown(edit), target(this.app.store.now));
+      const { corners } = leading(this.app.shownCages(edit), target(this.app.store.now));
       this.app.viewport.focus(middle(corners), 2 * extent(corners));
       return;
     }

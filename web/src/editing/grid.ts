@@ -1,9 +1,9 @@
-/** The faint grid of the selected edit, asked for again as its cages move: it may lag behind them, never queue. */
+/** Deformed grid of the selected edit, requested from the server whenever its cages have moved, one request at a time. */
 import type { Cages } from "./drag";
 import type { Answer, EditState, Vec3 } from "../net/protocol";
 
-/** Shortest time between two questions, milliseconds. */
-const PAUSE = 150;
+/** Milliseconds between two requests, at least. */
+const REQUEST_INTERVAL_MS = 150;
 
 export class Grid {
   private edit = 0;
@@ -16,13 +16,13 @@ export class Grid {
     private readonly changed: () => void,
   ) {}
 
-  /** Nothing is known any more. */
-  forget(): void {
+  /** Makes the next call of `linesFor` request new lines. */
+  clear(): void {
     this.key = "";
   }
 
-  /** The newest lines of an edit; where its cages have moved on, newer ones are asked for. */
-  of(edit: EditState, { deformed, outer }: Cages): Vec3[][] {
+  /** The last lines received for an edit; new ones are requested if its cages have moved since. */
+  linesFor(edit: EditState, { deformed, outer }: Cages): Vec3[][] {
     if (edit.kind !== "continuous" || outer === null || !edit.enabled) return [];
     if (edit.id !== this.edit) {
       this.edit = edit.id;
@@ -39,7 +39,7 @@ export class Grid {
         setTimeout(() => {
           this.asking = false;
           this.changed();
-        }, PAUSE);
+        }, REQUEST_INTERVAL_MS);
       });
     }
     return this.lines;

@@ -47,7 +47,7 @@ export class Pointer {
     canvas.addEventListener("pointerrawupdate", (event) => {
       if (this.hold !== null) this.locate(event as PointerEvent);
     });
-    app.presenter.beforeAsking.push(() => this.catchUp());
+    app.frames.beforeRequest.push(() => this.catchUp());
     canvas.addEventListener("pointerup", (event) => this.up(event));
     canvas.addEventListener("pointercancel", () => this.cancel());
     canvas.addEventListener("pointerleave", () => this.leave());

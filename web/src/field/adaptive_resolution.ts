@@ -1,43 +1,51 @@
-/** How large pictures may be so that they come quickly enough, from how long the last ones took. */
+/** Adaptive resolution: the size of moving frames, and the height of bands of still ones, from the measured cost of a pixel. */
 
-/** Shares of the full width and height at which pictures are drawn while something moves. */
+/** Shares of the full width and height at which moving frames are drawn. */
 const SCALES = [1, 0.75, 0.5, 0.35, 0.25, 0.18, 0.12];
 
-export class Pacing {
-  /** Milliseconds a pixel, smoothed; null before the first picture. */
+/** Scale and rows of the first frame, before any cost is known. */
+const FIRST_SCALE = 0.25;
+const FIRST_ROWS = 16;
+
+const MIN_ROWS = 4;
+
+/** Weight of the newest measurement in the running mean of the cost. */
+const SMOOTHING = 0.3;
+
+export class AdaptiveResolution {
+  /** Milliseconds per pixel, a running mean; null before the first frame. */
   private cost: number | null = null;
 
-  /** `moving`: milliseconds that a picture may take while something moves; `part`: those of a part of a still one. */
+  /** `frameBudget`: milliseconds of a moving frame; `bandBudget`: milliseconds of a band of a still frame. */
   constructor(
-    private readonly moving = 28,
-    private readonly part = 40,
+    private readonly frameBudget = 28,
+    private readonly bandBudget = 40,
   ) {}
 
-  /** Takes note of a picture, or part of one, of so many pixels. */
-  took(pixels: number, milliseconds: number): void {
+  /** Records the time of a frame, or of a band, of so many pixels. */
+  record(pixels: number, milliseconds: number): void {
     const cost = milliseconds / Math.max(1, pixels);
-    this.cost = this.cost === null ? cost : this.cost + 0.3 * (cost - this.cost);
+    this.cost = this.cost === null ? cost : this.cost + SMOOTHING * (cost - this.cost);
   }
 
-  /** The share of width and height for pictures while something moves. */
+  /** Share of the full width and height for moving frames. */
   scale(width: number, height: number): number {
     const { cost } = this;
-    if (cost === null) return 0.25;
-    return (
-      SCALES.find((scale) => cost * width * height * scale * scale <= this.moving) ??
-      SCALES[SCALES.length - 1]
-    );
+    if (cost === null) return FIRST_SCALE;
+    const fits = (scale: number): boolean => cost * width * height * scale * scale <= this.frameBudget;
+    return SCALES.find(fits) ?? SCALES[SCALES.length - 1];
   }
 
-  /** How many rows of a still picture to draw at a time. */
-  rows(width: number, height: number): number {
-    if (this.cost === null) return 16;
-    return Math.max(4, Math.min(height, Math.floor(this.part / Math.max(1e-9, this.cost * width))));
+  /** Number of rows in a band of a still frame. */
+  bandRows(width: number, height: number): number {
+    if (this.cost === null) return FIRST_ROWS;
+    const rows = Math.floor(this.bandBudget / Math.max(1e-9, this.cost * width));
+    return Math.max(MIN_ROWS, Math.min(height, rows));
   }
 }
 
-/** Milliseconds until the GPU has done what it was told so far. */
-export async function finished(gl: WebGL2RenderingContext): Promise<number> {
+/** Milliseconds until the GPU has executed all commands so far. */
+export async function waitForGpu(gl: WebGL2RenderingContext): Promise<number> {
   const began = performance.now();
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl.flush();

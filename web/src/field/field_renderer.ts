@@ -20,12 +20,13 @@ import { fragment } from "./march_glsl";
 import type { Variant } from "./march_glsl";
 import { reachOf, setField, setView } from "./march_uniforms";
 import type { PinholeCamera } from "./march_uniforms";
+import { readEdits } from "./page_edits";
 import type { PageEdits } from "./page_edits";
 import type { PlacedLayer } from "./page_layers";
-import type { Bytes, OnArrival } from "./page_file";
+import type { Bytes } from "./page_file";
 import { plainState, unbind, WHOLE } from "./present";
 import { ShownField } from "./shown_field";
-import type { SceneDrawer } from "./scene_drawer";
+import type { LoadOptions, RenderOptions, SceneDrawer } from "./scene_drawer";
 import { Targets } from "./targets";
 import type { Reading } from "./targets";
 import { Views } from "./views";
@@ -33,28 +34,10 @@ import type { Distances, View } from "./views";
 
 type GL = WebGL2RenderingContext;
 
-export interface LoadOptions {
-  onArrival?: OnArrival;
-  /** Called when a level can be drawn: the coarse one, then the full one. */
-  onLevel?: (number: number, of: number) => void;
-}
-
-export interface Picture {
-  normals?: boolean;
-  /** Wants splats in the order of this very camera, and waits for it. */
-  sorted?: boolean;
-  /** Counts of samples and texture reads in place of depth. */
-  count?: boolean;
-  /** Rows from the bottom that are drawn: a picture in parts keeps slow GPUs responsive. */
-  rows?: { first: number; count: number };
-  /** Columns from the left that are drawn. */
-  columns?: { first: number; count: number };
-}
-
 /** Bytes of textures that a field may take unless the caller says otherwise. */
 const MEMORY = 768 * 2 ** 20;
 
-export class FieldRenderer implements SceneDrawer {
+export class FieldRenderer implements SceneDrawer<PageEdits> {
   background: Vec3 = [1, 1, 1];
   near = 0;
   /** Whether the edits are seen; false shows the field before them. */
@@ -65,6 +48,8 @@ export class FieldRenderer implements SceneDrawer {
   readonly inBands = true;
   readonly inOrder = true;
   readonly editable = true;
+  /** Never called: voxels need no depth order. */
+  onOrder: (() => void) | null = null;
   /** Milliseconds that the last new shader took to compile. */
   compileTime = 0;
   compiled = 0;
@@ -139,7 +124,11 @@ export class FieldRenderer implements SceneDrawer {
     if (shown) await this.take(shown.level, () => turn === this.loading);
   }
 
-  /** Of voxels' edits nothing takes long. */
+  async readEdits(file: ArrayBuffer, before: PageEdits | null): Promise<PageEdits> {
+    return await readEdits(file, before);
+  }
+
+  /** Edits of voxels need no preparation. */
   async prepare(): Promise<void> {}
 
   /** The edits that the field is seen through; null for none. Uploads what is other than before. */
@@ -149,7 +138,7 @@ export class FieldRenderer implements SceneDrawer {
   }
 
   /** Draws what the camera sees into `targets`; false while there is nothing to draw. */
-  render(picture: Picture = {}): boolean {
+  render(options: RenderOptions = {}): boolean {
     const { gl, shown, camera, active } = this;
     if (!shown || !camera || gl.isContextLost()) return false;
     const { level, textures } = shown;
@@ -159,8 +148,8 @@ export class FieldRenderer implements SceneDrawer {
       contracted: level.field.contracted,
       edited: active !== null,
       edits: active && unrolled(active.edits),
-      normals: picture.normals ?? false,
-      count: picture.count ?? false,
+      normals: options.normals ?? false,
+      count: options.count ?? false,
     };
     const { program, uniform } = this.program(variant, level.field.brick);
     this.targets.bind(variant.normals);
@@ -193,8 +182,8 @@ export class FieldRenderer implements SceneDrawer {
       gl.uniform1i(uniform("preserveOpacity"), Number(active.preserveOpacity));
       gl.uniform1i(uniform("layered"), Number(shown.layered));
     }
-    const { first, count } = picture.rows ?? { first: 0, count: height };
-    const across = picture.columns ?? { first: 0, count: width };
+    const { first, count } = options.rows ?? { first: 0, count: height };
+    const across = options.columns ?? { first: 0, count: width };
     gl.enable(gl.SCISSOR_TEST);
     gl.scissor(across.first, first, across.count, count);
     gl.drawArrays(gl.TRIANGLES, 0, 3);

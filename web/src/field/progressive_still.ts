@@ -1,43 +1,44 @@
-/** A picture at rest, drawn whole in bands of rows so that the page goes on answering; given up when anything moves. */
+/** Progressive drawing of a still frame: bands of rows that leave the page responsive, restarted by every change. */
 
-/** Milliseconds after the last change until the picture counts as at rest. */
-export const SETTLES = 60;
+/** Milliseconds after the last change until the frame counts as still. */
+export const SETTLE_MS = 60;
 
-/** The same where the whole picture may take long and is drawn at once, in the middle of a drag. */
-export const RESTS = 400;
+/** Milliseconds of the same wait where a complete frame may take long and cannot be drawn in bands. */
+export const UNBANDED_SETTLE_MS = 400;
 
-export class Still {
-  private changed = -Infinity;
-  private row = 0;
-  private done = false;
+/** A band of rows, from the bottom of the frame. */
+export interface Band {
+  first: number;
+  count: number;
+}
 
-  /** Something is other than before, so that the picture begins anew; `whole` where one was drawn at once. */
-  moved(now: number, whole: boolean): void {
-    this.changed = now;
-    this.row = 0;
-    this.done = whole;
+export class ProgressiveStill {
+  private changedAt = -Infinity;
+  private nextRow = 0;
+  private complete = false;
+
+  /** Restarts the frame after a change at time `now` (ms); `complete` if the change was drawn as a complete frame. */
+  restart(now: number, complete: boolean): void {
+    this.changedAt = now;
+    this.nextRow = 0;
+    this.complete = complete;
   }
 
-  /** Whether the whole picture of what is to be seen was drawn. */
-  get whole(): boolean {
-    return this.done;
+  /** Whether the complete frame has been drawn. */
+  get isComplete(): boolean {
+    return this.complete;
   }
 
-  /** The rows to draw now, at most so many; null where none are, or nothing has changed for less than `settles` ms. */
-  next(
-    now: number,
-    height: number,
-    most: number,
-    settles = SETTLES,
-  ): { first: number; count: number } | null {
-    if (this.done || now - this.changed < settles) return null;
-    return { first: this.row, count: Math.min(most, height - this.row) };
+  /** The band to draw now, at most `maxRows` rows; null if the frame is complete or has changed less than `settleMs` ago. */
+  nextBand(now: number, height: number, maxRows: number, settleMs = SETTLE_MS): Band | null {
+    if (this.complete || now - this.changedAt < settleMs) return null;
+    return { first: this.nextRow, count: Math.min(maxRows, height - this.nextRow) };
   }
 
-  /** The rows were drawn; whether all of them are. */
-  drew({ first, count }: { first: number; count: number }, height: number): boolean {
-    this.row = first + count;
-    this.done = this.row >= height;
-    return this.done;
+  /** Records a drawn band; returns whether the frame is complete. */
+  finishBand({ first, count }: Band, height: number): boolean {
+    this.nextRow = first + count;
+    this.complete = this.nextRow >= height;
+    return this.complete;
   }
 }

@@ -1,73 +1,75 @@
-/** Who draws sooner, the page or the server: both are measured, in milliseconds a pixel. */
+/** Choice of the render location, page or server, from the measured cost of both in milliseconds per pixel. */
 
-/** Pictures of the page that are measured before it is judged. */
-const MEASURED = 6;
+/** Number of the page's frames measured before a comparison. */
+const MIN_FRAMES = 6;
 
-/** How many times as long the page may take: its pictures come at once, the server's have a way to go. */
-const LENIENCE = 1.25;
+/** Factor by which the page may be slower: the page's frames need no transfer. */
+const MAX_SLOWDOWN = 1.25;
 
-/** Milliseconds in which the page may draw a whole picture whatever the server takes. */
-export const WHOLE = 200;
+/** Milliseconds in which the page may draw a complete frame, whatever the server takes. */
+export const COMPLETE_FRAME_MS = 200;
 
-export class Choice {
-  /** Milliseconds a pixel; null before there was a picture. */
-  page: number | null = null;
-  server: number | null = null;
-  private pictures = 0;
-  private wasMoving = false;
-  private isWhole = false;
+/** Factor by which the limit is relaxed while the page draws complete frames, so that the choice does not alternate. */
+const HYSTERESIS = 1.5;
 
-  /** The page has drawn a picture, or a part of one, of so many pixels. */
-  drew(pixels: number, milliseconds: number): void {
-    this.pictures += 1;
-    this.page = smoothed(this.page, milliseconds / Math.max(1, pixels));
+/** Weight of the newest measurement in a running mean. */
+const SMOOTHING = 0.3;
+
+export class RenderLocation {
+  /** Milliseconds per pixel; null before the first frame. */
+  pageCost: number | null = null;
+  serverCost: number | null = null;
+  private frames = 0;
+  private measuredMoving = false;
+  private drawsComplete = false;
+
+  /** Records a frame, or a band, of the page. */
+  recordPage(pixels: number, milliseconds: number): void {
+    this.frames += 1;
+    this.pageCost = smooth(this.pageCost, milliseconds / Math.max(1, pixels));
   }
 
-  /** The server has; pictures of what moves, which are quicker, say more than those at rest. */
-  served(pixels: number, milliseconds: number, moving: boolean): void {
-    if (this.wasMoving && !moving) return;
-    this.server = smoothed(
-      moving && !this.wasMoving ? null : this.server,
-      milliseconds / Math.max(1, pixels),
-    );
-    this.wasMoving = moving;
+  /** Records a frame of the server. Moving frames are cheaper per pixel: from the first one on, only they count. */
+  recordServer(pixels: number, milliseconds: number, moving: boolean): void {
+    if (this.measuredMoving && !moving) return;
+    const before = moving && !this.measuredMoving ? null : this.serverCost;
+    this.serverCost = smooth(before, milliseconds / Math.max(1, pixels));
+    this.measuredMoving = moving;
   }
 
-  /** Whether the server draws what moves sooner, as far as both are known. */
+  /** Whether the server draws moving frames faster, as far as both costs are known. */
   get serverIsFaster(): boolean {
-    return (
-      this.page !== null &&
-      this.server !== null &&
-      this.pictures >= MEASURED &&
-      this.page > LENIENCE * this.server
-    );
+    const { pageCost, serverCost } = this;
+    if (pageCost === null || serverCost === null || this.frames < MIN_FRAMES) return false;
+    return pageCost > MAX_SLOWDOWN * serverCost;
   }
 
-  /** Whether the page draws pictures at rest of so many pixels, too: they come soon, or sooner than the server's. */
-  whole(pixels: number): boolean {
-    if (this.page === null) return false;
-    // Not to and fro where it is close.
-    const slack = this.isWhole ? 1.5 : 1;
-    this.isWhole =
-      this.page * pixels <= slack * WHOLE || (this.server !== null && this.page <= slack * this.server);
-    return this.isWhole;
+  /** Whether the page draws complete frames of so many pixels: within COMPLETE_FRAME_MS, or faster than the server. */
+  chooseComplete(pixels: number): boolean {
+    const { pageCost, serverCost } = this;
+    if (pageCost === null) return false;
+    const slack = this.drawsComplete ? HYSTERESIS : 1;
+    const isQuick = pageCost * pixels <= slack * COMPLETE_FRAME_MS;
+    this.drawsComplete = isQuick || (serverCost !== null && pageCost <= slack * serverCost);
+    return this.drawsComplete;
   }
 
-  /** Both rates in words, for whoever wants to know why. */
-  get words(): string {
-    const rate = (cost: number | null): string =>
-      cost === null
-        ? "not measured"
-        : `${(1e-3 / Math.max(cost, 1e-9)).toPrecision(2)} million pixels a second`;
-    return `this page ${rate(this.page)}, the server ${rate(this.server)}`;
+  /** Text with both rates, for the status line's tooltip. */
+  get summary(): string {
+    return `this page ${describeRate(this.pageCost)}, the server ${describeRate(this.serverCost)}`;
   }
 }
 
-function smoothed(before: number | null, now: number): number {
-  return before === null ? now : before + 0.3 * (now - before);
+function describeRate(cost: number | null): string {
+  if (cost === null) return "not measured";
+  return `${(1e-3 / Math.max(cost, 1e-9)).toPrecision(2)} million pixels a second`;
 }
 
-/** Bytes of textures that a field may take on a device of so many GiB, where the browser says how many. */
+function smooth(before: number | null, now: number): number {
+  return before === null ? now : before + SMOOTHING * (now - before);
+}
+
+/** Bytes of GPU memory that a scene may take on a device with so many GiB, where the browser states the number. */
 export function memoryLimit(deviceMemory: number | undefined): number {
   return Math.min(768, Math.max(96, (deviceMemory ?? 8) * 128)) * 2 ** 20;
 }

@@ -1,157 +1,184 @@
-/** Pictures from when they come, or the page draws them, until they are on the screen and the next ones are asked for. */
-import type { App } from "../app/app";
+/** Frame pacing: decoding of the server's frames in order, their presentation, and the request for the next ones. */
+import type { Vector3 } from "three";
+import type { Figures, Store } from "../app/store";
+import type { PageMessage, PictureHeader } from "../net/protocol";
+import type { CameraFeed } from "./camera_feed";
 import { Latency } from "./latency";
 import { decode, unpack } from "./picture_message";
-import type { PictureHeader } from "../net/protocol";
-import type { Figures } from "../app/store";
+import type { Pictures } from "./pictures";
 import { Throttle } from "./throttle";
 
-/** Milliseconds between figures while pictures keep coming: a text that changes costs a frame of its own. */
-const FIGURES_EVERY = 300;
+/** Milliseconds between updates of the figures while frames keep coming: a changed text costs a frame of its own. */
+const FIGURES_INTERVAL_MS = 300;
 
 /**
- * When a drag's next picture is asked for, frames after the beginning of one that draws a picture. Sooner, and it
- * would wait here to be drawn and show an older drag; later, and there would be fewer of them.
+ * Delay of the request for a drag's next frame, in frame times after the start of a frame with a new image. A shorter
+ * delay makes the image wait here and show an older drag; a longer one lowers the frame rate.
  */
-const ASKED_AFTER = 0.5;
+const REQUEST_DELAY_FRAMES = 0.5;
 
-/** A picture, and when it came and was decoded. */
-interface Arrived {
+/** A frame, and when it arrived and was decoded (ms of the page's clock). */
+interface ReceivedFrame {
   header: PictureHeader;
   received: number;
   decoded: number;
 }
 
-export class Presenter {
+/** The parts of the editor that the pacer uses. */
+export interface PacerHost {
+  readonly store: Store;
+  readonly viewport: {
+    /** Called after the orbit's center was guessed. */
+    guessed: (() => void)[];
+    afterFrame: ((time: number) => void)[];
+    readonly frameTime: number;
+    readonly camera: { readonly position: Pick<Vector3, "toArray"> };
+    orbitAt(distance: number): void;
+    invalidate(): void;
+  };
+  readonly pictures: Pick<Pictures, "show"> & { readonly depth: Pick<Pictures["depth"], "at"> };
+  readonly camera: Pick<CameraFeed, "seq" | "viewpoint">;
+  isDragging(): boolean;
+  /** Records the time that the server took for a frame. */
+  recordServerFrame(header: PictureHeader): void;
+  /** Whether the page itself has drawn what a frame of the server shows. */
+  supersedes(header: PictureHeader): boolean;
+  send(message: PageMessage): boolean;
+  say(text: string, level: "warning"): void;
+}
+
+export class FramePacer {
   readonly latency = new Latency();
-  /** Called before a picture is asked for: what it should show is to be sent. */
-  beforeAsking: (() => void)[] = [];
+  /** Called before a frame is requested: messages that the frame should show are to be sent first. */
+  beforeRequest: (() => void)[] = [];
+  /** Header of the frame shown last, the page's own (number 0) or the server's. */
   last: PictureHeader | null = null;
-  /** When a picture or a state last came. */
-  news = 0;
-  private chain: Promise<void> = Promise.resolve();
-  /** Pictures that the next frame draws, and those drawn that are not on the screen yet. */
-  private undrawn: Arrived[] = [];
-  private drawn: Arrived[] = [];
-  /** Edits that the next frame shows, and pictures that nobody gets to see. */
-  private taken: number[] = [];
-  /** The first camera message whose picture says what to orbit around, where that is yet to be seen. */
+  /** Time of the last frame or state. */
+  lastNews = 0;
+  private decoding: Promise<void> = Promise.resolve();
+  /** Frames that the next redraw shows, and shown frames that are not on the screen yet. */
+  private undrawn: ReceivedFrame[] = [];
+  private drawn: ReceivedFrame[] = [];
+  /** Numbers to acknowledge at the next redraw: edits it shows, and superseded frames. */
+  private acknowledged: number[] = [];
+  /** Number of the first camera message whose frame gives the orbit's center; null once it is known. */
   private orbitFrom: number | null = null;
-  /** The figures below the picture: those of the last one, however soon it came after the one before it. */
   private readonly figures: Throttle<Figures>;
 
-  constructor(private readonly app: App) {
-    const { viewport, store } = app;
-    this.figures = new Throttle<Figures>(FIGURES_EVERY, (figures) => store.set({ figures }));
-    viewport.guessed.push(() => this.orbitGuessed());
-    viewport.afterFrame.push((time) => this.framed(time));
+  constructor(private readonly host: PacerHost) {
+    const { viewport, store } = host;
+    this.figures = new Throttle<Figures>(FIGURES_INTERVAL_MS, (figures) => store.set({ figures }));
+    viewport.guessed.push(() => this.awaitOrbitCenter());
+    viewport.afterFrame.push((time) => this.finishFrame(time));
   }
 
-  /** Takes note of a picture of the page's own, which the next frame shows. */
-  drew(header: PictureHeader, received: number, decoded: number): void {
+  /** Adds a frame drawn by the page, which the next redraw shows. */
+  add(header: PictureHeader, received: number, decoded: number): void {
     this.last = header;
-    this.news = performance.now();
-    this.orbitSeen(header.camera);
+    this.lastNews = performance.now();
+    this.setOrbitCenter(header.camera);
     this.drawn.push({ header, received, decoded });
   }
 
-  /** The next frame shows edits, or a picture came too late: the server may send the next ones. */
-  acknowledge(edits: number[]): void {
-    this.taken.push(...edits);
+  /** Acknowledges edits, or superseded frames, at the next redraw, so that the server sends the next ones. */
+  acknowledge(numbers: number[]): void {
+    this.acknowledged.push(...numbers);
   }
 
-  /** Decodes a picture away from the main thread, and shows pictures in the order in which they came. */
-  take(bytes: ArrayBuffer, header: PictureHeader, start: number): void {
-    const { app } = this;
+  /** Decodes a frame of the server off the main thread, and shows frames in the order of their arrival. */
+  take(message: ArrayBuffer, header: PictureHeader, start: number): void {
     const received = performance.now();
-    const { picture, depth } = unpack(bytes, header, start);
+    const { picture, depth } = unpack(message, header, start);
     const decoding = decode(header, picture);
-    this.chain = this.chain.then(async () => {
+    this.decoding = this.decoding.then(async () => {
       try {
-        const image = await decoding;
-        const decoded = performance.now();
-        app.page.served(header);
-        // Of what the page draws itself, what the server sends comes too late.
-        if (app.page.outdates(header)) {
-          if (image instanceof ImageBitmap) image.close();
-          app.viewport.invalidate();
-          this.acknowledge([header.picture]);
-        } else {
-          app.pictures.show(header, image, depth, app.camera.viewpoint(header.camera));
-          this.orbitSeen(header.camera);
-          this.last = header;
-          this.undrawn.push({ header, received, decoded });
-        }
-        this.news = performance.now();
+        this.show(header, await decoding, depth, received);
       } catch {
-        app.say("a picture from the server could not be decoded", "warning");
-        app.send({ type: "presented", picture: header.picture });
+        this.host.say("a picture from the server could not be decoded", "warning");
+        this.host.send({ type: "presented", picture: header.picture });
       }
     });
   }
 
-  /** Asks for the next picture while the frame with this one is drawn and goes to the screen. */
-  askForMore(): void {
-    const pictures = this.undrawn.map(({ header }) => header.picture);
-    const numbers = [...pictures, ...this.taken];
+  /** Requests the next frames while the current redraw goes to the screen. */
+  requestNext(): void {
+    const { host } = this;
+    const numbers = [...this.undrawn.map(({ header }) => header.picture), ...this.acknowledged];
     if (numbers.length > 0) {
-      const waits = this.app.drag !== null && this.taken.length === 0;
-      setTimeout(
-        () => {
-          for (const action of this.beforeAsking) action();
-          for (const picture of numbers) this.app.send({ type: "presented", picture });
-        },
-        waits ? ASKED_AFTER * this.app.viewport.frameTime : 0,
-      );
+      const waits = host.isDragging() && this.acknowledged.length === 0;
+      const request = (): void => {
+        for (const action of this.beforeRequest) action();
+        for (const picture of numbers) host.send({ type: "presented", picture });
+      };
+      setTimeout(request, waits ? REQUEST_DELAY_FRAMES * host.viewport.frameTime : 0);
     }
     this.drawn.push(...this.undrawn);
     this.undrawn = [];
-    this.taken = [];
+    this.acknowledged = [];
   }
 
-  /** From amid the field, whose middle is nothing to orbit around, the next picture says what is. */
-  private orbitGuessed(): void {
-    const { store, viewport, camera } = this.app;
+  private show(
+    header: PictureHeader,
+    image: ImageBitmap | ImageData,
+    depth: Uint16Array,
+    received: number,
+  ): void {
+    const { host } = this;
+    const decoded = performance.now();
+    host.recordServerFrame(header);
+    if (host.supersedes(header)) {
+      if (image instanceof ImageBitmap) image.close();
+      host.viewport.invalidate();
+      this.acknowledge([header.picture]);
+    } else {
+      host.pictures.show(header, image, depth, host.camera.viewpoint(header.camera));
+      this.setOrbitCenter(header.camera);
+      this.last = header;
+      this.undrawn.push({ header, received, decoded });
+    }
+    this.lastNews = performance.now();
+  }
+
+  /** From inside the field, whose middle is no useful center of the orbit, the next frame's depth gives the center. */
+  private awaitOrbitCenter(): void {
+    const { store, viewport, camera } = this.host;
     const { hello } = store.now;
     if (hello === null) return;
     const [low, high] = hello.bounds;
-    const amid = viewport.camera.position.toArray().every((x, i) => low[i] < x && x < high[i]);
-    this.orbitFrom = amid ? camera.seq + 1 : null;
+    const isInside = viewport.camera.position.toArray().every((x, i) => low[i] < x && x < high[i]);
+    this.orbitFrom = isInside ? camera.seq + 1 : null;
   }
 
-  /** Once: the orbit's centre is what the picture of a camera message shows in the middle of the view. */
-  private orbitSeen(camera: number): void {
-    const { pictures, viewport } = this.app;
-    if (this.orbitFrom === null || camera < this.orbitFrom || camera !== this.app.camera.seq) return;
+  /** Sets the awaited center of the orbit to the surface in the middle of the frame of a camera message. */
+  private setOrbitCenter(camera: number): void {
+    const { pictures, viewport } = this.host;
+    if (this.orbitFrom === null || camera < this.orbitFrom || camera !== this.host.camera.seq) return;
     const distance = pictures.depth.at(0.5, 0.5);
     if (distance === null) return;
     viewport.orbitAt(distance);
     this.orbitFrom = null;
   }
 
-  private framed(time: number): void {
+  private finishFrame(time: number): void {
     this.latency.framed(time);
-    const shown = this.drawn;
+    const { drawn } = this;
     this.drawn = [];
-    for (const picture of shown) this.presented(picture);
+    for (const frame of drawn) this.record(frame);
   }
 
-  private presented({ header, received, decoded }: Arrived): void {
+  /** Records the latency and the figures of a frame that is on the screen. */
+  private record({ header, received, decoded }: ReceivedFrame): void {
     const time = performance.now();
-    const { drag, seq, camera, revision, width, full_width, final, render_ms, encode_ms } = header;
-    this.latency.shown(
-      { time, drag, seq, camera, revision, width, fullWidth: full_width, final },
-      received,
-      decoded,
-      render_ms,
-      encode_ms,
-    );
+    const { drag, seq, camera, revision, width, full_width, full_height, final } = header;
+    const { render_ms: renderMs, encode_ms: encodeMs } = header;
+    const presented = { time, drag, seq, camera, revision, width, fullWidth: full_width, final };
+    this.latency.shown(presented, received, decoded, renderMs, encodeMs);
     const figures: Figures = {
       perSecond: this.latency.perSecond(time),
-      renderMs: render_ms,
-      encodeMs: encode_ms,
+      renderMs,
+      encodeMs,
       width: full_width,
-      height: header.full_height,
+      height: full_height,
       final,
       page: header.picture === 0,
     };

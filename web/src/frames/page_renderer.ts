@@ -1,306 +1,364 @@
 /**
- * Pictures drawn by the page's own GPU: what moves at the display's rate, and whole pictures at rest.
+ * Rendering by the page's own GPU: moving frames at the display's rate, and complete frames of a still view.
  *
- * The field is loaded once, after the server's first whole picture. From then on the page says with `drawing` what
- * it draws, and is sent the edits each time they are others, those of drags too, in the place of pictures. Whatever
- * it cannot draw, or draws more slowly than the server, the server draws. Of the page's address
- * `?render=server` leaves all to the server, `?render=page` trusts the page's GPU with what moves even where
- * it is software, and `?render=all` with pictures at rest too.
+ * The field is loaded once, after the server's first complete frame. From then on the page announces with `drawing`
+ * which frames it draws, and receives edits, those of drags included, in place of images. The server draws whatever the
+ * page cannot draw, or draws more slowly than the server. The states are those of `render_state`.
  */
-import { Choice, memoryLimit } from "../field/render_location";
-import { Pacing } from "../field/adaptive_resolution";
-import { RESTS, SETTLES, Still } from "../field/progressive_still";
+import type { PerspectiveCamera } from "three";
+import type { DrawnHere, Editor, Store } from "../app/store";
+import { AdaptiveResolution } from "../field/adaptive_resolution";
+import { ProgressiveStill, SETTLE_MS, UNBANDED_SETTLE_MS } from "../field/progressive_still";
+import type { Band } from "../field/progressive_still";
+import { RenderLocation } from "../field/render_location";
+import type { SceneDrawer } from "../field/scene_drawer";
+import type { EditsHeader, PageMessage, PictureHeader } from "../net/protocol";
+import type { SceneKind } from "../splats/drawer_selection";
+import { currentFrame, hasSameView, isRefined, isServed, NO_FRAME, ownHeader } from "./frame_state";
+import type { CameraState, ViewSource } from "./frame_state";
 import { PageScene } from "./page_scene";
-import { isFiner, isServed, NOTHING, ownHeader, sameView, sightOf } from "./frame_state";
-import { AnyRenderer } from "../splats/any_renderer";
-import type { App } from "../app/app";
-import type { EditsHeader, PictureHeader } from "../net/protocol";
-import type { DrawnHere, Editor } from "../app/store";
+import type { Pictures } from "./pictures";
+import { drawnHere, IDLE, nextState, reasonOf } from "./render_state";
+import type { RenderState } from "./render_state";
 
-/** Milliseconds that one of the page's pictures may take at its smallest; the server's moving pictures take as long. */
-const SLOWEST = 120;
+/** Milliseconds that a frame of the smallest size may take; the server's moving frames take as long. */
+const MAX_FRAME_MS = 120;
 
-/** Pictures in a row that are slower before the server draws for good. */
-const PATIENCE = 5;
+/** Number of consecutive slower frames after which the server draws for good. */
+const MAX_SLOW_FRAMES = 5;
 
-/** Distances that are read back of a picture, at most. */
-const MOST_DISTANCES = 120_000;
+/** Share of the canvas below which a frame counts as one of the smallest size. */
+const SMALL_FRAME_SHARE = 0.05;
+
+/** Number of distances that are read back of a frame. */
+const MAX_DISTANCES = 120_000;
+
+const MIN_FRAME_PIXELS = 16;
+
+/**
+ * Frames that the page's address leaves to the page: `?render=server` none, `?render=page` moving ones even if its GPU
+ * is software, `?render=all` complete ones too; without the parameter the faster of page and server draws.
+ */
+export type RenderRequest = "server" | "page" | "all" | "fastest";
+
+export function renderRequest(search: string): RenderRequest {
+  const given = new URLSearchParams(search).get("render");
+  return given === "page" || given === "server" || given === "all" ? given : "fastest";
+}
+
+/** The parts of the editor that the renderer uses. */
+export interface RenderHost extends ViewSource {
+  readonly store: Store;
+  readonly viewport: ViewSource["viewport"] & {
+    readonly software: boolean;
+    readonly renderer: { resetState(): void };
+    readonly camera: Pick<PerspectiveCamera, "fov">;
+    readonly c2w: number[];
+    readonly canvas: Pick<HTMLCanvasElement, "addEventListener">;
+    beforeFrame: (() => void)[];
+    invalidate(): void;
+  };
+  readonly pictures: Pick<Pictures, "showOwn">;
+  readonly camera: CameraState & { restate(): void };
+  readonly frames: FrameQueue;
+  send(message: PageMessage): boolean;
+  say(text: string, level: "warning"): void;
+}
+
+/** The part of `FramePacer` that the renderer uses. */
+export interface FrameQueue {
+  /** Header of the frame shown last, the page's own (number 0) or the server's. */
+  readonly last: PictureHeader | null;
+  add(header: PictureHeader, received: number, decoded: number): void;
+  acknowledge(numbers: number[]): void;
+}
 
 export class PageRenderer {
-  /** Pictures that the page has drawn. */
+  /** Number of frames drawn by the page. */
   drawn = 0;
   readonly scene: PageScene;
-  readonly drawer: AnyRenderer;
-  readonly choice = new Choice();
-  private readonly wanted: "server" | "page" | "all" | "best";
-  private readonly pacing = new Pacing();
-  private readonly still = new Still();
-  /** Why the server draws for good, or as long as the edits are these. */
-  private closed: string | null = null;
-  private refused: { why: string; pictured: number | undefined } | null = null;
-  /** What the server was told, and of which page. */
-  private told: { here: DrawnHere; page: number | null } = { here: "nothing", page: null };
-  private seen = NOTHING;
-  private slow = 0;
-  /** Whether the last picture, or part of one, had its splats in order. */
-  private inOrder = true;
-  /** Milliseconds that the last picture, or part of one, took. */
-  private took = 0;
-  /** Edits that were taken and not acknowledged. */
-  private taken: number[] = [];
+  readonly location = new RenderLocation();
+  private state: RenderState = IDLE;
+  /** The frames that the server knows the page to draw, and the page's number on that server. */
+  private announced: { here: DrawnHere; page: number } | null = null;
+  private readonly resolution = new AdaptiveResolution();
+  private readonly still = new ProgressiveStill();
+  /** The state of the frame drawn last. */
+  private frame = NO_FRAME;
+  private slowFrames = 0;
+  /** Whether the splats of the last frame or band were in depth order. */
+  private sorted = true;
+  /** Milliseconds of the last frame or band. */
+  private renderMs = 0;
+  /** Numbers of applied edits that are not acknowledged yet. */
+  private applied: number[] = [];
 
-  constructor(private readonly app: App) {
-    const given = new URLSearchParams(location.search).get("render");
-    this.wanted = given === "page" || given === "server" || given === "all" ? given : "best";
-    const { viewport } = app;
-    const memory = memoryLimit((navigator as { deviceMemory?: number }).deviceMemory);
-    this.drawer = new AnyRenderer(viewport.renderer.getContext() as WebGL2RenderingContext, memory);
-    this.drawer.onOrder = () => this.ordered();
-    this.scene = new PageScene(this.drawer, {
-      changed: () => this.changed(),
-      arrived: (share) => this.app.store.set({ loading: share }),
+  constructor(
+    private readonly host: RenderHost,
+    private readonly request: RenderRequest,
+    createDrawer: (kind: SceneKind) => SceneDrawer,
+  ) {
+    const { viewport, store } = host;
+    const create = (kind: SceneKind): SceneDrawer => {
+      const drawer = createDrawer(kind);
+      drawer.onOrder = () => this.redraw();
+      return drawer;
+    };
+    this.scene = new PageScene(create, {
+      changed: () => this.refresh(),
+      progressed: (share) => store.set({ loading: share }),
       failed: (why) => this.fail(why),
     });
-    if (this.wanted === "server") this.close("the page's address says so");
-    else if (this.wanted === "best" && viewport.software) this.close("the page has no GPU");
-    app.store.watch(["figures", "state", "hello", "connection"], (now) => this.follow(now));
-    viewport.beforeFrame.push(() => this.frame());
+    if (request === "server") this.close("the page's address says so");
+    else if (request === "fastest" && viewport.software) this.close("the page has no GPU");
+    store.watch(["figures", "state", "hello", "connection"], (now) => this.follow(now));
+    viewport.beforeFrame.push(() => this.drawFrame());
     viewport.canvas.addEventListener("webglcontextrestored", () => void this.restore());
   }
 
-  /** Why the server draws, or null where the page does. */
+  /** Reason why the server draws; null where the page does. */
   get why(): string | null {
-    return this.closed ?? this.scene.why ?? this.refused?.why ?? null;
+    const reason = reasonOf(this.state);
+    return this.state.name === "closed" ? reason : (this.scene.obstacle ?? reason);
   }
 
-  /** Whether pictures of what moves are the page's own now. */
+  /** Whether moving frames are the page's own now. */
   get draws(): boolean {
-    return this.told.here !== "nothing" && this.why === null && this.scene.edits !== null;
+    return this.here !== "nothing" && this.scene.obstacle === null && this.scene.edits !== null;
   }
 
-  /** Which pictures are the page's own, as the server was told. */
+  /** The frames that the page draws, as announced to the server. */
   get here(): DrawnHere {
-    return this.told.here;
+    return drawnHere(this.state);
   }
 
-  /** Whether a picture of the server's shows what is older than what the page shows, or draws itself. */
-  outdates(header: PictureHeader): boolean {
+  /** Bytes of edits uploaded to the GPU, by the last change and by all. */
+  get uploaded(): SceneDrawer["uploaded"] {
+    return this.scene.drawer?.uploaded ?? { last: 0, total: 0 };
+  }
+
+  /** Whether a frame of the server is older than the page's own, or one that the page draws itself. */
+  supersedes(header: PictureHeader): boolean {
     const { edits } = this.scene;
     if (!this.draws || edits === null) return false;
-    return this.told.here === "all" || !this.app.camera.resting || header.revision < edits.header.revision;
+    return this.here === "all" || !this.host.camera.resting || header.revision < edits.header.revision;
   }
 
-  /** Takes note of how long the server took for a picture. */
-  served({ width, height, full_width, render_ms, encode_ms }: PictureHeader): void {
-    this.choice.served(width * height, render_ms + encode_ms, full_width < this.app.viewport.pixels.width);
+  /** Records the time that the server took for a frame. */
+  recordServerFrame({ width, height, full_width, render_ms, encode_ms }: PictureHeader): void {
+    const moving = full_width < this.host.viewport.pixels.width;
+    this.location.recordServer(width * height, render_ms + encode_ms, moving);
   }
 
-  /** Takes a message's edits. */
-  take(header: EditsHeader, file: ArrayBuffer): void {
-    if (header.why !== null) this.refuse(header.why, header.picture);
-    else
-      this.scene.take(header, file, (why) =>
-        why === null ? this.tookEdits(header) : this.refuse(why, header.picture),
-      );
+  /** Applies the edits of a message, or takes the server's word that the page cannot draw them. */
+  takeEdits(header: EditsHeader, file: ArrayBuffer): void {
+    if (header.why !== null) {
+      this.refuse(header.why, header.picture);
+      return;
+    }
+    this.scene.take(header, file, (why) => {
+      if (why === null) this.confirmEdits(header);
+      else this.refuse(why, header.picture);
+    });
   }
 
-  private tookEdits(header: EditsHeader): void {
-    this.app.viewport.renderer.resetState();
-    this.taken.push(header.picture);
-    this.changed();
+  private confirmEdits(header: EditsHeader): void {
+    this.host.viewport.renderer.resetState();
+    this.applied.push(header.picture);
+    this.refresh();
   }
 
   private refuse(why: string, picture: number): void {
-    this.refused = { why, pictured: this.app.store.now.state?.pictured };
-    this.app.send({ type: "presented", picture });
-    this.follow(this.app.store.now);
+    if (this.state.name !== "closed")
+      this.state = { name: "refused", why, pictured: this.host.store.now.state?.pictured };
+    this.host.send({ type: "presented", picture });
+    this.follow(this.host.store.now);
   }
 
-  /** The server draws from now on, and a line says why. */
   private fail(why: string): void {
     this.close(why);
-    this.app.say(`${why}; the server draws the pictures`, "warning");
+    this.host.say(`${why}; the server draws the pictures`, "warning");
   }
 
   private close(why: string): void {
-    this.closed = why;
-    this.drawer.dispose();
-    this.changed();
-    this.follow(this.app.store.now);
+    this.state = { name: "closed", why };
+    this.scene.dispose();
+    this.refresh();
   }
 
-  private changed(): void {
-    const { app } = this;
-    app.viewport.renderer.resetState();
-    this.follow(app.store.now);
-    app.viewport.invalidate();
+  private refresh(): void {
+    const { viewport, store } = this.host;
+    viewport.renderer.resetState();
+    this.follow(store.now);
+    viewport.invalidate();
   }
 
-  /** Loads what is missing once the server's first whole picture is there, and tells the server who draws. */
+  /** Loads the scene once the server's first complete frame is there, and announces each change of the state. */
   private follow(now: Editor): void {
-    if (now.connection !== "open") this.told = { here: "nothing", page: null };
-    if (now.hello === null || now.state === null || now.connection !== "open") return;
-    if (this.closed === null && now.figures.final) this.scene.load(now.hello.field, now.hello.page);
-    if (this.refused !== null && this.refused.pictured !== now.state.pictured) this.refused = null;
-    if (this.told.page !== now.hello.page) this.told = { here: "nothing", page: now.hello.page };
-    const { mode } = this;
-    if (mode === this.told.here) return;
-    this.told = { here: mode, page: now.hello.page };
-    if (mode === "nothing") this.app.camera.restate();
-    this.app.send({ type: "drawing", here: mode });
+    const { hello, state, connection, figures } = now;
+    const connected = hello !== null && state !== null && connection === "open";
+    if (connected && this.state.name !== "closed" && figures.final) this.scene.load(hello.field, hello.page);
+    this.state = nextState(this.state, {
+      connected,
+      pictured: state?.pictured,
+      requested: this.scene.requested,
+      drawable: this.scene.obstacle === null,
+      drawsAll: this.drawsAll,
+    });
+    if (!connected) {
+      if (connection !== "open") this.announced = null;
+      return;
+    }
+    const { page } = hello;
+    const before = this.announced?.page === page ? this.announced.here : "nothing";
+    this.announced = { here: this.here, page };
+    if (this.here === before) return;
+    if (this.here === "nothing") this.host.camera.restate();
+    this.host.send({ type: "drawing", here: this.here });
   }
 
-  /** What the page can draw and does better. */
-  private get mode(): DrawnHere {
-    if (this.why !== null) return "nothing";
-    if (this.drawer.level?.last !== true) return "moving";
-    if (this.wanted === "all") return "all";
-    const { width, height } = this.app.viewport.pixels;
-    return !this.app.viewport.software && this.choice.whole(width * height) ? "all" : "moving";
+  private get drawsAll(): boolean {
+    if (this.scene.drawer?.level?.last !== true) return false;
+    if (this.request === "all") return true;
+    const { software, pixels } = this.host.viewport;
+    return !software && this.location.chooseComplete(pixels.width * pixels.height);
   }
 
-  /** Splats have been sorted for the camera: the view is drawn anew. */
-  private ordered(): void {
-    this.seen = NOTHING;
-    this.app.viewport.invalidate();
+  /** Has the current view drawn anew. */
+  private redraw(): void {
+    this.frame = NO_FRAME;
+    this.host.viewport.invalidate();
   }
 
   private async restore(): Promise<void> {
-    if (this.closed !== null) return;
-    await this.drawer.restore();
-    this.seen = NOTHING;
-    this.changed();
+    if (this.state.name === "closed") return;
+    await this.scene.drawer?.restore();
+    this.frame = NO_FRAME;
+    this.refresh();
   }
 
-  private frame(): void {
-    if (this.draws) this.draw();
-    const { taken } = this;
-    this.taken = [];
-    if (taken.length > 0) this.app.presenter.acknowledge(taken);
+  private drawFrame(): void {
+    const { drawer } = this.scene;
+    if (this.draws && drawer !== null) this.update(drawer);
+    const { applied } = this;
+    this.applied = [];
+    if (applied.length > 0) this.host.frames.acknowledge(applied);
   }
 
-  /** Draws the view where it is other than before; at rest, the next part of the whole picture. */
-  private draw(): void {
-    const { app } = this;
-    const seen = sightOf(app, this.drawer.level, this.scene.edits);
-    const moved = seen.edits !== this.seen.edits || !sameView(seen, this.seen);
-    const waits = moved && this.stays && isFiner(seen, this.seen);
-    this.seen = seen;
-    if (waits || isServed(app, seen.edits, this.told.here === "all")) return;
-    if (moved) this.drawMoved();
-    else if (this.drawsStills) this.drawStill();
-    if (this.drawsStills && !this.still.whole) app.viewport.invalidate();
+  /** Draws the view after a change; without one, the next band of the still frame. */
+  private update(drawer: SceneDrawer): void {
+    const { host, scene } = this;
+    const frame = currentFrame(host, drawer.level, scene.edits);
+    const changed = frame.edits !== this.frame.edits || !hasSameView(frame, this.frame);
+    const waits = changed && this.awaitsServer && isRefined(frame, this.frame);
+    this.frame = frame;
+    if (waits || isServed(host.frames.last, host.camera, host.store, frame.edits, this.here === "all"))
+      return;
+    if (changed) this.drawMoving(drawer);
+    else if (this.drawsStills) this.drawStill(drawer);
+    if (this.drawsStills && !this.still.isComplete) host.viewport.invalidate();
   }
 
-  /** Whether whole pictures are the page's own: all are, or a drag goes on, during which the server draws none for it. */
+  /** Whether complete frames are the page's own: always in the state `all`, and while the edits of a drag are shown. */
   private get drawsStills(): boolean {
-    return this.told.here === "all" || this.scene.edits?.header.final === false;
+    return this.here === "all" || this.scene.edits?.header.final === false;
   }
 
-  /** Draws the view as large as its time allows. */
-  private drawMoved(): void {
-    const { width, height } = this.app.viewport.pixels;
-    const scale = this.pacing.scale(width, height);
-    const size = [width, height].map((n) => Math.max(16, Math.round(scale * n)));
-    const drawn = this.paint(size[0], size[1], { first: 0, count: size[1] }, false);
-    this.still.moved(performance.now(), drawn && scale === 1 && this.inOrder);
-    if (drawn) this.present(size[0], size[1]);
-    else this.seen = NOTHING;
+  /** Draws the view at the size that the time of a frame allows. */
+  private drawMoving(drawer: SceneDrawer): void {
+    const { width, height } = this.host.viewport.pixels;
+    const scale = this.resolution.scale(width, height);
+    const [across, down] = [width, height].map((n) => Math.max(MIN_FRAME_PIXELS, Math.round(scale * n)));
+    const drawn = this.render(drawer, across, down, { first: 0, count: down }, false);
+    this.still.restart(performance.now(), drawn && scale === 1 && this.sorted);
+    if (drawn) this.present(drawer, across, down);
+    else this.frame = NO_FRAME;
   }
 
-  /** Draws the next rows of the whole picture; where all are there, says so once the camera rests. */
-  private drawStill(): void {
-    const { app, still } = this;
-    const { width, height } = app.viewport.pixels;
-    if (still.whole) {
-      const last = app.presenter.last;
-      if (app.camera.resting && last?.picture === 0 && last.camera !== app.camera.seq)
-        app.presenter.drew(this.header(width, height), 0, 0);
+  /** Draws the next band of the complete frame; reports a frame that is complete once the camera rests. */
+  private drawStill(drawer: SceneDrawer): void {
+    const { host, still } = this;
+    const { width, height } = host.viewport.pixels;
+    if (still.isComplete) {
+      const { last } = host.frames;
+      if (host.camera.resting && last?.picture === 0 && last.camera !== host.camera.seq)
+        host.frames.add(this.header(width, height), 0, 0);
       return;
     }
-    const most = this.drawer.inBands ? this.pacing.rows(width, height) : height;
-    const settles = this.told.here === "all" || this.drawer.inBands ? SETTLES : RESTS;
-    const rows = still.next(performance.now(), height, most, settles);
-    if (rows !== null && this.paint(width, height, rows, true) && still.drew(rows, height))
-      this.present(width, height);
+    const maxRows = drawer.inBands ? this.resolution.bandRows(width, height) : height;
+    const settleMs = this.here === "all" || drawer.inBands ? SETTLE_MS : UNBANDED_SETTLE_MS;
+    const band = still.nextBand(performance.now(), height, maxRows, settleMs);
+    if (band === null || !this.render(drawer, width, height, band, true)) return;
+    if (still.finishBand(band, height)) this.present(drawer, width, height);
   }
 
-  /** Whether a whole picture of the page's own stays until the server's is there. */
-  private get stays(): boolean {
-    return !this.drawsStills && this.still.whole && this.app.presenter.last?.picture === 0;
+  /** Whether a complete frame of the page's own stays on the screen until the server's arrives. */
+  private get awaitsServer(): boolean {
+    return !this.drawsStills && this.still.isComplete && this.host.frames.last?.picture === 0;
   }
 
-  /** Draws rows of the view, splats `sorted` for it or as they were; false where there is nothing to draw. */
-  private paint(
-    width: number,
-    height: number,
-    rows: { first: number; count: number },
-    sorted: boolean,
-  ): boolean {
-    const { drawer, app } = this;
-    const { view, before, split } = app.store.now;
-    const { viewport } = app;
+  /** Draws a band of the view, with splats `sorted` for it or as they are; false where there is nothing to draw. */
+  private render(drawer: SceneDrawer, width: number, height: number, rows: Band, sorted: boolean): boolean {
+    const { view, before, split } = this.host.store.now;
+    const { viewport } = this.host;
     const focal = (0.5 * height) / Math.tan((viewport.camera.fov * Math.PI) / 360);
+    const [cx, cy] = [0.5 * width, 0.5 * height];
     drawer.setSize(width, height);
-    drawer.setCamera({
-      c2w: viewport.c2w,
-      width,
-      height,
-      fx: focal,
-      fy: focal,
-      cx: 0.5 * width,
-      cy: 0.5 * height,
-    });
+    drawer.setCamera({ c2w: viewport.c2w, width, height, fx: focal, fy: focal, cx, cy });
     const { compiled } = drawer;
     const began = performance.now();
-    const left = before || split === null ? 0 : Math.round(split * width);
+    const boundary = before || split === null ? 0 : Math.round(split * width);
+    const parts = [
+      { edited: false, first: 0, end: boundary },
+      { edited: !before, first: boundary, end: width },
+    ];
     const normals = view === "normals";
     let drew = true;
-    this.inOrder = true;
-    for (const [edited, first, end] of [
-      [false, 0, left],
-      [!before, left, width],
-    ] as const) {
+    this.sorted = true;
+    for (const { edited, first, end } of parts) {
       if (first === end) continue;
       drawer.edited = edited;
       drew = drawer.render({ normals, sorted, rows, columns: { first, count: end - first } }) && drew;
-      this.inOrder &&= drawer.inOrder;
+      this.sorted &&= drawer.inOrder;
     }
     if (drew) drawer.wait();
     viewport.renderer.resetState();
     if (!drew) return false;
-    this.took = performance.now() - began;
-    // What had to wait for a shader says nothing of pictures to come.
+    this.renderMs = performance.now() - began;
+    // The time of a frame that waited for a shader says nothing of later frames.
     if (drawer.compiled === compiled)
-      this.measured(width * rows.count, this.took, height === viewport.pixels.height);
+      this.recordFrame(width * rows.count, this.renderMs, height === viewport.pixels.height);
     return true;
   }
 
-  /** Puts what was drawn on the screen, and says so. */
-  private present(width: number, height: number): void {
-    const { app, drawer } = this;
-    const { view } = app.store.now;
-    const distances = drawer.distances(MOST_DISTANCES);
-    app.pictures.showOwn(distances, (framebuffer, across, down) =>
+  /** Puts the drawn frame on the screen, unless its time has just left rendering to the server. */
+  private present(drawer: SceneDrawer, width: number, height: number): void {
+    const { host, scene } = this;
+    if (this.state.name === "closed") return;
+    const { view } = host.store.now;
+    const distances = drawer.distances(MAX_DISTANCES);
+    host.pictures.showOwn(distances, (framebuffer, across, down) =>
       drawer.show(across, down, framebuffer, view),
     );
     this.drawn += 1;
-    const { edits } = this.scene;
-    app.presenter.drew(this.header(width, height), edits?.received ?? 0, edits?.taken ?? 0);
+    host.frames.add(this.header(width, height), scene.edits?.received ?? 0, scene.edits?.decoded ?? 0);
   }
 
-  private measured(pixels: number, took: number, isWhole: boolean): void {
-    this.pacing.took(pixels, took);
-    this.choice.drew(pixels, took);
-    const { width, height } = this.app.viewport.pixels;
-    this.slow = took > SLOWEST && !isWhole && pixels < 0.05 * width * height ? this.slow + 1 : 0;
-    if (this.wanted !== "best") return;
-    if (this.slow >= PATIENCE) this.close("the page's GPU is too slow");
-    else if (this.choice.serverIsFaster) this.close(`the server is faster: ${this.choice.words}`);
+  /** Takes note of the time of a frame or band, and leaves rendering to the server where the page is too slow. */
+  private recordFrame(pixels: number, milliseconds: number, isFullSize: boolean): void {
+    this.resolution.record(pixels, milliseconds);
+    this.location.recordPage(pixels, milliseconds);
+    const { width, height } = this.host.viewport.pixels;
+    const isSmall = !isFullSize && pixels < SMALL_FRAME_SHARE * width * height;
+    this.slowFrames = milliseconds > MAX_FRAME_MS && isSmall ? this.slowFrames + 1 : 0;
+    if (this.request !== "fastest") return;
+    if (this.slowFrames >= MAX_SLOW_FRAMES) this.close("the page's GPU is too slow");
+    else if (this.location.serverIsFaster) this.close(`the server is faster: ${this.location.summary}`);
   }
 
   private header(width: number, height: number): PictureHeader {
-    const whole = this.drawsStills && this.still.whole && width === this.app.viewport.pixels.width;
-    return ownHeader(this.app, this.scene.edits, [width, height], whole, this.took);
+    const { camera, store, viewport } = this.host;
+    const complete = this.drawsStills && this.still.isComplete && width === viewport.pixels.width;
+    return ownHeader(camera, store, this.scene.edits, [width, height], complete, this.renderMs);
   }
 }

@@ -1,120 +1,158 @@
-/** The scene as the page's GPU has it: its field, loaded once, and its edits as they come. */
-import { OutOfMemory } from "../field/gl";
+/** The scene on the page's GPU: its field, loaded once, and its edits as they arrive. */
 import { TooLarge } from "../field/atlas";
-import type { SceneDrawer } from "../field/scene_drawer";
+import { OutOfMemory } from "../field/gl";
 import type { Vec3 } from "../field/level";
-import { readAnyEdits } from "../splats/any_renderer";
-import type { AnyEdits } from "../splats/any_renderer";
+import type { SceneDrawer } from "../field/scene_drawer";
 import type { EditsHeader } from "../net/protocol";
+import { identifyScene } from "../splats/drawer_selection";
+import type { SceneKind } from "../splats/drawer_selection";
 
-/** What is behind a scene that has no background; as in `render_worker.encoding`. */
-const BEHIND: Vec3 = [0.13, 0.13, 0.15];
+/** Color behind a scene without a background; the same as in `render_worker.encoding`. */
+const DEFAULT_BACKGROUND: Vec3 = [0.13, 0.13, 0.15];
 
-/** Edits that are shown, or would be. */
-export interface TakenEdits {
+const NOT_LOADED = "the field is not loaded yet";
+
+/** Edits on the GPU, and when their file arrived and was decoded (ms of the page's clock). */
+export interface AppliedEdits {
   header: EditsHeader;
-  /** When they came, and were unpacked. */
   received: number;
-  taken: number;
+  decoded: number;
 }
 
 export interface SceneEvents {
-  /** More of the field, or other edits, can be drawn. */
+  /** Another level, or other edits, can be drawn. */
   changed(): void;
-  /** The share of the field's file that has come; null once all of it has. */
-  arrived(share: number | null): void;
-  /** The GPU cannot draw the scene; the server goes on to. */
+  /** The share of the field's file that has arrived; null once the load is over. */
+  progressed(share: number | null): void;
+  /** The GPU cannot draw the scene, and the server goes on drawing. */
   failed(why: string): void;
 }
 
 export class PageScene {
-  /** Why nothing can be drawn; null where it can. */
-  why: string | null = "the field is not loaded yet";
-  /** The edits that are on the GPU. */
-  edits: TakenEdits | null = null;
-  /** How often a field was loaded. */
+  /** Reason why nothing can be drawn; null where the scene can be drawn. */
+  obstacle: string | null = NOT_LOADED;
+  /** The renderer of the scene that was loaded last; null before the first load. */
+  drawer: SceneDrawer | null = null;
+  /** The edits on the GPU. */
+  edits: AppliedEdits | null = null;
+  /** Number of loads of a field so far. */
   loads = 0;
-  /** The name of the field that is there or on its way; see `Hello.field`. */
+  private kind: SceneKind | null = null;
+  /** The name of the field that is loaded or loading; see `Hello.field`. */
   private name: string | null = null;
-  /** The page's number when loading it failed; a page that has another one since tries again. */
-  private failedAs: number | null = null;
-  private unpacked: AnyEdits | null = null;
-  private chain: Promise<void> = Promise.resolve();
+  /** The page's number during the failed load; a page with another number loads again. */
+  private failedPage: number | null = null;
+  /** The decoded edits, which supply the parts that a later file omits. */
+  private decoded: unknown = null;
+  private queue: Promise<void> = Promise.resolve();
 
   constructor(
-    private readonly drawer: SceneDrawer<AnyEdits>,
+    private readonly createDrawer: (kind: SceneKind) => SceneDrawer,
     private readonly events: SceneEvents,
   ) {}
 
-  /** Loads the field of a name, unless it is the one that is there: pages that reconnect, as another one, have it. */
+  /** Whether the load of a field has begun. */
+  get requested(): boolean {
+    return this.name !== null;
+  }
+
+  /** Loads the field of a name, unless it is the current one: a reconnected page, with another number, still has it. */
   load(name: string, page: number): void {
-    if (name === this.name && (this.failedAs === null || this.failedAs === page)) return;
-    this.forget();
+    if (name === this.name && (this.failedPage === null || this.failedPage === page)) return;
+    this.clear();
     this.name = name;
     void this.fetch(name, page);
   }
 
-  /** Takes a message's edits after those before it; calls `done` with whether they are there now. */
+  /** Decodes and applies edits in the order of their arrival; calls `done` with null, or with the reason of a failure. */
   take(header: EditsHeader, file: ArrayBuffer, done: (why: string | null) => void): void {
     const received = performance.now();
     const { name } = this;
-    this.chain = this.chain.then(async () => {
+    this.queue = this.queue.then(async () => {
       try {
-        const edits = await readAnyEdits(file, this.unpacked);
-        await this.drawer.prepare(edits);
+        const { drawer } = this;
+        if (drawer === null) throw new Error(NOT_LOADED);
+        const edits = await drawer.readEdits(file, this.decoded);
+        await drawer.prepare(edits);
         if (name !== this.name) return;
-        this.drawer.setEdits(edits);
-        this.unpacked = edits;
-        this.edits = { header, received, taken: performance.now() };
+        drawer.setEdits(edits);
+        this.decoded = edits;
+        this.edits = { header, received, decoded: performance.now() };
         done(null);
       } catch (error) {
-        if (error instanceof TooLarge || error instanceof OutOfMemory) this.events.failed(error.message);
-        done(said(error));
+        if (isMemoryError(error)) this.events.failed(error.message);
+        done(messageOf(error));
       }
     });
   }
 
-  /** Lets go of a field that is no longer the editor's. */
-  forget(): void {
-    this.name = this.failedAs = null;
-    this.edits = this.unpacked = null;
-    this.why = "the field is not loaded yet";
-    this.drawer.setEdits(null);
+  /** Frees the scene; loads and edits in progress come to nothing. */
+  dispose(): void {
+    this.clear();
+    this.drawer?.dispose();
+    this.drawer = this.kind = null;
+  }
+
+  private clear(): void {
+    this.name = this.failedPage = null;
+    this.edits = null;
+    this.decoded = null;
+    this.obstacle = NOT_LOADED;
+    this.drawer?.setEdits(null);
   }
 
   private async fetch(name: string, page: number): Promise<void> {
     try {
-      this.why = "the field is being loaded";
+      this.obstacle = "the field is being loaded";
       const answer = await fetch(`field${location.search}`);
       if (name !== this.name) return;
       if (!answer.ok || answer.body === null) {
-        this.why = (await answer.text()) || `the field cannot be loaded (${answer.status})`;
+        this.obstacle = (await answer.text()) || `the field cannot be loaded (${answer.status})`;
         return;
       }
       this.loads += 1;
       const length = Number(answer.headers.get("Content-Length"));
-      await this.drawer.load(answer.body, {
-        onArrival: (bytes) => this.events.arrived(length > 0 ? Math.min(1, bytes / length) : 0),
+      const { kind, source } = await identifyScene(answer.body);
+      if (name !== this.name) {
+        await source.cancel();
+        return;
+      }
+      const drawer = this.selectDrawer(kind);
+      await drawer.load(source, {
+        onArrival: (bytes) => this.events.progressed(length > 0 ? Math.min(1, bytes / length) : 0),
         onLevel: () => {
-          if (name !== this.name || !this.drawer.editable) return;
-          this.drawer.background = this.drawer.level?.field.background ?? BEHIND;
-          this.why = null;
+          if (name !== this.name || !drawer.editable) return;
+          drawer.background = drawer.level?.field.background ?? DEFAULT_BACKGROUND;
+          this.obstacle = null;
           this.events.changed();
         },
       });
     } catch (error) {
       if (name !== this.name) return;
-      if (error instanceof TooLarge || error instanceof OutOfMemory) this.events.failed(error.message);
+      if (isMemoryError(error)) this.events.failed(error.message);
       else {
-        this.why = said(error);
-        this.failedAs = page;
+        this.obstacle = messageOf(error);
+        this.failedPage = page;
       }
     } finally {
-      this.events.arrived(null);
+      this.events.progressed(null);
     }
+  }
+
+  /** The renderer of a kind of scene: the current one, or a new one in its place. */
+  private selectDrawer(kind: SceneKind): SceneDrawer {
+    if (this.drawer !== null && this.kind === kind) return this.drawer;
+    this.drawer?.dispose();
+    this.drawer = this.createDrawer(kind);
+    this.kind = kind;
+    return this.drawer;
   }
 }
 
-function said(error: unknown): string {
+function isMemoryError(error: unknown): error is Error {
+  return error instanceof TooLarge || error instanceof OutOfMemory;
+}
+
+function messageOf(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }

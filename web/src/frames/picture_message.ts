@@ -1,29 +1,29 @@
-/** Binary messages: a header in JSON, a picture and its depth. */
+/** Format of binary messages: a header in JSON, an image and its depth map. */
 import type { EditsHeader, PictureHeader } from "../net/protocol";
 
-export interface Parcel {
+export interface PictureParts {
   header: PictureHeader;
   picture: Uint8Array;
-  /** Distances in steps of `depth_scale`, row by row; 65535 where there is nothing. */
+  /** Distances in units of `depth_scale`, row by row; 65535 where the ray hits nothing. */
   depth: Uint16Array;
 }
 
-/** The header of a binary message, and where what it heads begins. */
-export function headed(message: ArrayBuffer): { header: PictureHeader | EditsHeader; start: number } {
+/** The header of a binary message, and the offset of the byte after it. */
+export function readHeader(message: ArrayBuffer): { header: PictureHeader | EditsHeader; start: number } {
   const length = new DataView(message).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, length))) as
     PictureHeader | EditsHeader;
   return { header, start: 4 + length };
 }
 
-/** The parts of a picture's message whose header ends at `start`. */
-export function unpack(message: ArrayBuffer, header: PictureHeader, start: number): Parcel {
+/** The image and the depth map of a message whose header ends at byte `start`. */
+export function unpack(message: ArrayBuffer, header: PictureHeader, start: number): PictureParts {
   const picture = new Uint8Array(message, start, header.picture_bytes);
   const at = start + header.picture_bytes;
   return { header, picture, depth: new Uint16Array(message.slice(at, at + header.depth_bytes)) };
 }
 
-/** The picture of a message: decoded away from the main thread, or at once where it came as it is. */
+/** The decoded image: a JPEG off the main thread, raw RGB at once. */
 export async function decode(header: PictureHeader, picture: Uint8Array): Promise<ImageBitmap | ImageData> {
   if (header.format === "jpeg") {
     return createImageBitmap(new Blob([picture.slice()]), { colorSpaceConversion: "none" });
@@ -38,7 +38,7 @@ export async function decode(header: PictureHeader, picture: Uint8Array): Promis
   return image;
 }
 
-/** A binary message of these parts, as the server makes it. */
+/** A binary message in the format of the server, for tests. */
 export function pack(header: PictureHeader, picture: Uint8Array, depth: Uint16Array): ArrayBuffer {
   const json = new TextEncoder().encode(JSON.stringify(header));
   const bytes = new Uint8Array(4 + json.length + picture.length + depth.byteLength);

@@ -6,13 +6,12 @@
  * `onOrder` says when it is worth drawing again; edits are sorted before they are shown (`prepare`).
  */
 import { TooLarge } from "../field/atlas";
-import type { LoadOptions, Picture } from "../field/field_renderer";
 import type { Vec3 } from "../field/level";
 import { reachOf } from "../field/march_uniforms";
 import type { PinholeCamera } from "../field/march_uniforms";
 import type { Bytes } from "../field/page_file";
 import { plainState, unbind } from "../field/present";
-import type { SceneDrawer } from "../field/scene_drawer";
+import type { LoadOptions, RenderOptions, SceneDrawer } from "../field/scene_drawer";
 import { Targets } from "../field/targets";
 import type { Reading } from "../field/targets";
 import { Views } from "../field/views";
@@ -20,6 +19,7 @@ import type { Distances, View } from "../field/views";
 import type { SplatSet } from "./depth_order";
 import { formatsOf } from "./blend_target";
 import type { Formats } from "./blend_target";
+import { readEditsBeside } from "./edits_reader";
 import { same, Sorter } from "./sorter";
 import { depthsOf } from "./splat_camera";
 import { CHANGED } from "./splat_edits";
@@ -152,6 +152,11 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     this.setEdits(changed?.edits ?? null);
   }
 
+  /** Edits of splats: a file holds all of them, whatever was there before. */
+  async readEdits(file: ArrayBuffer): Promise<SplatEdits> {
+    return await readEditsBeside(file);
+  }
+
   /** Has the splats of edits sorted, and is done when `setEdits` with the same edits need not wait for that. */
   async prepare(edits: SplatEdits): Promise<void> {
     const { store, camera } = this;
@@ -192,18 +197,18 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
   }
 
   /** Draws what the camera sees into `targets`; false while there is nothing to draw. */
-  render(picture: Picture = {}): boolean {
+  render(options: RenderOptions = {}): boolean {
     const { gl, store, camera, background, near } = this;
     if (!store || store.count === 0 || !camera || gl.isContextLost()) return false;
     const { width, height } = this.targets;
     const set = this.shown(store);
     const depths = depthsOf(store.header, camera, near);
     const sorter = set === store.set ? this.sorters.before : this.sorters.after;
-    const order = sorter.of(set, depths, picture.sorted ?? false);
+    const order = sorter.of(set, depths, options.sorted ?? false);
     this.inOrder = same(order.depths, depths);
     plainState(gl);
-    const rows = picture.rows ?? { first: 0, count: height };
-    const columns = picture.columns ?? { first: 0, count: width };
+    const rows = options.rows ?? { first: 0, count: height };
+    const columns = options.columns ?? { first: 0, count: width };
     const changed = this.changed?.texture ?? null;
     this.passes.draw({
       store,
@@ -211,7 +216,7 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
       camera,
       near,
       order,
-      normals: picture.normals ?? false,
+      normals: options.normals ?? false,
       background,
       rows,
       columns,

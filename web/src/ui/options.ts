@@ -66,7 +66,7 @@ export function options(app: App, actions: Actions): HTMLElement {
   position.on("change", ({ value, last }) => {
     const edit = selected(app.store.now);
     if (filling || !last || edit === null) return;
-    const { pivot } = leading(app.shown(edit), target(app.store.now));
+    const { pivot } = leading(app.shownCages(edit), target(app.store.now));
     const by = vec(value).map((x, i) => tidy(x - pivot[i])) as Vec3;
     if (Math.hypot(...by) > 1e-9) applyNow({ kind: "translate", by });
   });
@@ -152,7 +152,7 @@ export function options(app: App, actions: Actions): HTMLElement {
     const edit = selected(now);
     whole.hidden = edit === null;
     if (edit === null) return;
-    const { pivot } = leading(app.shown(edit), target(now));
+    const { pivot } = leading(app.shownCages(edit), target(now));
     Object.assign(model, {
       kind: edit.kind,
       from: edit.source?.split(/[\\/]/).at(-1) ?? "",

@@ -51,7 +51,7 @@ export function status(app: App): HTMLElement {
       f.width > 0
         ? `${speed}${f.width}×${f.height} · ${f.renderMs.toFixed(0)} ms · ${f.page ? "drawn here" : "by the server"}`
         : "";
-    figures.title = [app.page.why ?? "", app.page.choice.words].filter((text) => text !== "").join(" · ");
+    figures.title = [app.page.why ?? "", app.page.location.summary].filter((text) => text !== "").join(" · ");
     saved.textContent = state === null ? "" : state.saved ? "saved" : "not saved";
     saved.classList.toggle("due", state?.saved === false);
     connection.className = `connection ${c}`;

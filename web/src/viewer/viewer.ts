@@ -1,7 +1,7 @@
-/** An exported scene: its field and edits, with orbit, before/after and the camera path; no server of its own. */
-import { finished, Pacing } from "../field/adaptive_resolution";
-import { AnyRenderer, magicOf, readAnyEdits } from "../splats/any_renderer";
-import type { AnyEdits } from "../splats/any_renderer";
+/** Viewer of an exported scene: field and edits, with orbit, before/after and the camera path, without a server. */
+import { AdaptiveResolution, waitForGpu } from "../field/adaptive_resolution";
+import type { SceneDrawer } from "../field/scene_drawer";
+import { createDrawer, identifyScene, readMagic } from "../splats/drawer_selection";
 import { listen } from "./touch_controls";
 import { Orbit } from "./orbit";
 import { viewAt } from "./camera_path";
@@ -12,38 +12,41 @@ import type { FileEntry } from "./sources";
 import { SPLAT_PATH, SplatPath } from "./splat_path";
 import type { Vec3 } from "./vectors";
 
-/** What an exported file says of its scene. */
+/** Description of a scene in an exported page. */
 export interface SceneHeader {
   start: View;
   up: Vec3;
   centre: Vec3;
   background: Vec3 | null;
   path: Path | null;
-  /** `edits`: those of the scene. `path`: how far they have gone along the camera path. */
+  /** `edits`: the edits of the scene; `path`: the edits at moments of the camera path. */
   files: { field: FileEntry; edits?: FileEntry; path?: FileEntry };
 }
 
-/** Milliseconds after the last motion until the picture is drawn whole. */
-const STILL = 120;
-const MOST_PIXELS_PER_POINT = 2;
+/** Milliseconds after the last motion until a complete frame is drawn. */
+const SETTLE_MS = 120;
+const MAX_PIXELS_PER_POINT = 2;
+const MIN_FRAME_PIXELS = 8;
 
 export class SceneViewer {
-  readonly renderer: AnyRenderer;
+  /** The renderer of the scene's kind; null until the first bytes of the field file have arrived. */
+  renderer: SceneDrawer | null = null;
   orbit: Orbit;
   private readonly gl: WebGL2RenderingContext;
-  private readonly pacing = new Pacing();
+  private readonly resolution = new AdaptiveResolution();
   private fov: number;
   private moved = performance.now();
-  /** The next row of the whole picture; null where it is shown. */
+  /** The next row of the complete frame; null once the complete frame is shown. */
   private row: number | null = 0;
-  /** Whether what is to be seen has been shown at all, if small: only then is the whole picture drawn. */
+  /** Whether the current view has been shown at least at a low resolution; the complete frame comes after that. */
   private sketched = false;
-  /** Pictures that have been shown. */
+  /** Number of frames shown. */
   pictures = 0;
   private playing: number | null = null;
-  /** The scene's edits; undefined while they are on their way. */
-  private edits: AnyEdits | null | undefined;
-  /** The edits along the path, and whether it can be played. */
+  /** The scene's edits; undefined until they are loaded. */
+  private edits: unknown;
+  private showsEdits = true;
+  /** The edits at moments of the camera path. */
   private along: PathEdits | SplatPath | null = null;
   canPlay = false;
 
@@ -61,8 +64,6 @@ export class SceneViewer {
     });
     if (!gl) throw new Error("This browser has no WebGL2, which the scene is drawn with.");
     this.gl = gl;
-    this.renderer = new AnyRenderer(gl);
-    this.renderer.background = header.background ?? [1, 1, 1];
     this.orbit = new Orbit(header.start.c2w, header.up, header.centre);
     this.fov = header.start.fov_y_deg;
     listen(canvas, {
@@ -77,7 +78,7 @@ export class SceneViewer {
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener(
       "webglcontextrestored",
-      () => void this.renderer.restore().then(() => this.touch()),
+      () => void this.renderer?.restore().then(() => this.touch()),
     );
     new ResizeObserver(() => this.touch()).observe(canvas);
   }
@@ -86,13 +87,16 @@ export class SceneViewer {
   async run(): Promise<void> {
     const { files } = this.header;
     void this.draw();
-    const field = await open("field", files.field);
+    const { kind, source } = await identifyScene(await open("field", files.field));
+    const renderer = (this.renderer = createDrawer(kind, this.gl));
+    renderer.background = this.header.background ?? [1, 1, 1];
+    renderer.edited = this.showsEdits;
     let edits: Promise<void> | undefined;
-    await this.renderer.load(field, {
+    await renderer.load(source, {
       onArrival: (bytes) => this.arrived(Math.min(0.99, bytes / files.field.bytes)),
-      onLevel: (number, of) => {
-        this.say(number < of ? "Loading detail …" : "");
-        edits ??= this.loadEdits();
+      onLevel: (number, count) => {
+        this.say(number < count ? "Loading detail …" : "");
+        edits ??= this.loadEdits(renderer);
         this.touch();
       },
     });
@@ -102,25 +106,28 @@ export class SceneViewer {
     this.arrived(1);
   }
 
-  /** Loads the scene's edits, once there is something to see. */
-  private async loadEdits(): Promise<void> {
+  /** Loads the scene's edits, after the first level of the field. */
+  private async loadEdits(renderer: SceneDrawer): Promise<void> {
     const { files } = this.header;
-    this.edits = files.edits ? await readAnyEdits(await whole(await open("edits", files.edits)), null) : null;
-    this.renderer.setEdits(this.edits);
+    this.edits = files.edits
+      ? await renderer.readEdits(await whole(await open("edits", files.edits)), null)
+      : null;
+    renderer.setEdits(this.edits);
     this.touch();
   }
 
-  /** Whether the whole picture of what is to be seen is shown. */
+  /** Whether the complete frame of the current view is shown. */
   get whole(): boolean {
     return this.row === null;
   }
 
   get edited(): boolean {
-    return this.renderer.edited;
+    return this.showsEdits;
   }
 
   set edited(on: boolean) {
-    this.renderer.edited = on;
+    this.showsEdits = on;
+    if (this.renderer) this.renderer.edited = on;
     this.touch();
   }
 
@@ -128,23 +135,23 @@ export class SceneViewer {
     return this.playing !== null;
   }
 
-  /** Plays the camera path from its begin, or stops where it is. */
+  /** Plays the camera path from its start, or stops the playback. */
   play(on: boolean): void {
     this.playing = on && this.canPlay ? performance.now() : null;
     this.touch();
   }
 
-  /** Goes back to where the scene opens, with its edits whole. */
+  /** Returns to the first view of the scene, with the complete edits. */
   home(): void {
     this.playing = null;
-    if (this.edits !== undefined) this.renderer.setEdits(this.edits);
+    if (this.edits !== undefined) this.renderer?.setEdits(this.edits);
     this.look(this.header.start);
   }
 
   /** Shows a moment of the camera path. */
   seek(path: Path, seconds: number): void {
     const time = path.loop ? seconds % path.seconds : Math.min(seconds, path.seconds);
-    if (this.along) this.renderer.setEdits(this.along.at(time) ?? this.edits ?? null);
+    if (this.along) this.renderer?.setEdits(this.along.at(time) ?? this.edits ?? null);
     this.look(viewAt(path, time));
   }
 
@@ -183,58 +190,54 @@ export class SceneViewer {
   }
 
   private async frame(): Promise<void> {
-    const { canvas, gl, renderer, pacing } = this;
+    const { canvas, gl, renderer, resolution } = this;
     const { path } = this.header;
     if (this.playing !== null && path) {
       const time = (performance.now() - this.playing) / 1000;
       this.seek(path, time);
       if (!path.loop && time >= path.seconds) this.playing = null;
     }
-    // The full level is not shown before its edits are there.
-    if (this.row === null || (renderer.level?.last && this.edits === undefined)) return;
-    const dense = Math.min(devicePixelRatio, MOST_PIXELS_PER_POINT);
+    // The full level is not shown before its edits are loaded.
+    if (renderer === null || this.row === null || (renderer.level?.last && this.edits === undefined)) return;
+    const dense = Math.min(devicePixelRatio, MAX_PIXELS_PER_POINT);
     const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((n) =>
       Math.max(1, Math.round(n * dense)),
     );
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-    const scale = pacing.scale(width, height);
-    const still = (this.sketched && performance.now() - this.moved > STILL) || scale === 1;
-    const size = still ? [width, height] : [width, height].map((n) => Math.max(8, Math.round(n * scale)));
-    this.aim(size[0], size[1]);
+    const scale = resolution.scale(width, height);
+    const still = (this.sketched && performance.now() - this.moved > SETTLE_MS) || scale === 1;
+    const size = still
+      ? [width, height]
+      : [width, height].map((n) => Math.max(MIN_FRAME_PIXELS, Math.round(n * scale)));
+    this.aim(renderer, size[0], size[1]);
     const first = still ? this.row : 0;
-    const count = still && renderer.inBands ? Math.min(pacing.rows(width, height), height - first) : size[1];
+    const count =
+      still && renderer.inBands ? Math.min(resolution.bandRows(width, height), height - first) : size[1];
     const moved = this.moved;
-    const sorted = performance.now() - moved > STILL;
+    const sorted = performance.now() - moved > SETTLE_MS;
     if (!renderer.render({ rows: { first, count }, sorted })) return;
     const whole = first + count >= size[1];
     if (whole) {
       renderer.show(width, height);
       this.pictures++;
     }
-    pacing.took(size[0] * count, await finished(gl));
+    resolution.record(size[0] * count, await waitForGpu(gl));
     if (this.moved !== moved) return;
     this.sketched = true;
-    // Splats in the order of a moment ago are drawn anew.
+    // Splats in the depth order of an earlier camera are drawn anew.
     if (still) this.row = !whole ? first + count : renderer.inOrder ? null : 0;
   }
 
-  private aim(width: number, height: number): void {
+  private aim(renderer: SceneDrawer, width: number, height: number): void {
     const focal = (0.5 * Math.min(width, height)) / this.tangent;
-    this.renderer.setSize(width, height);
-    this.renderer.setCamera({
-      c2w: this.orbit.c2w,
-      width,
-      height,
-      fx: focal,
-      fy: focal,
-      cx: width / 2,
-      cy: height / 2,
-    });
+    const [cx, cy] = [width / 2, height / 2];
+    renderer.setSize(width, height);
+    renderer.setCamera({ c2w: this.orbit.c2w, width, height, fx: focal, fy: focal, cx, cy });
   }
 }
 
 async function readPath(file: ArrayBuffer): Promise<PathEdits | SplatPath> {
-  return magicOf(new Uint8Array(file)) === SPLAT_PATH
+  return readMagic(new Uint8Array(file)) === SPLAT_PATH
     ? await SplatPath.read(file)
     : await PathEdits.read(file);
 }
