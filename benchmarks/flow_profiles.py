@@ -107,7 +107,7 @@ def measure(edit: Edit, weight: Weight | None) -> tuple[float, float]:
             shell.__dict__["coefficients"] = weight.coefficients
     near = np.random.default_rng(0).uniform(-1.0, 1.0, (1000, 3))
     near *= np.linspace(1.0, 1.2, len(near))[:, None] / np.abs(near).max(axis=1, keepdims=True)
-    p = Extended.of(edit.deformed).points(near)
+    p = Extended.from_cage(edit.deformed).points(near)
     p = p[edit.outer.contains(p) & ~edit.deformed.contains(p)]
     J = shell.to_canonical(np.concatenate([p, shell_samples(edit.deformed, edit.outer, 1000)]))[1]
     det = np.linalg.det(J)

@@ -145,7 +145,7 @@ def random_operation(rng: np.random.Generator) -> Operation:
         turn = rng.choice([1.0, rng.random()]) * np.pi * axis / np.linalg.norm(axis)
         return Rotate.from_rotation(Rotation.from_rotvec(turn).as_euler("XYZ"))
     if kind == 2:
-        return Scale.of(rng.choice([0.3, 3.0, float(np.exp(x))], 3 if rng.random() < 0.5 else None))
+        return Scale.from_factors(rng.choice([0.3, 3.0, float(np.exp(x))], 3 if rng.random() < 0.5 else None))
     if kind == 3:
         return Shear(xy=x, zx=y)
     if kind == 4:
@@ -169,8 +169,10 @@ def measure(edit: Edit, rng: np.random.Generator, n: int, kind: type, compared: 
     if compared:
         reference = float(np.abs(shell.to_canonical(p)[0] - q).max(initial=0.0) / size)
     face = on_cube(rng, n // 3)
-    on_face = back(Extended.of(edit.deformed).points(face))[0] - Extended.of(edit.inner).points(face)
-    rim = Extended.of(edit.outer).points(on_cube(rng, n // 3))
+    on_face = back(Extended.from_cage(edit.deformed).points(face))[0] - Extended.from_cage(edit.inner).points(
+        face
+    )
+    rim = Extended.from_cage(edit.outer).points(on_cube(rng, n // 3))
     moved, inside = _moved(edit, rng, n), _inside(edit, rng, n)
     canonical = _shell_points(edit.outer, edit.inner, rng, n)
     open_trip = trip = _round_trip(back, canonical, there(canonical)[0], size)
@@ -193,14 +195,14 @@ def _shell_points(outer: Cage, inner: Cage, rng: np.random.Generator, n: int) ->
     """Points between the cages, a third of them near the inner one."""
     origin, frame = outer.frame
     near = on_cube(rng, n // 3) * rng.uniform(1.0, 1.2, (n // 3, 1))
-    p = np.concatenate([origin + rng.random((n, 3)) @ frame.T, Extended.of(inner).points(near)])
+    p = np.concatenate([origin + rng.random((n, 3)) @ frame.T, Extended.from_cage(inner).points(near)])
     return p[outer.contains(p) & ~inner.contains(p)]
 
 
 def _moved(edit: Edit, rng: np.random.Generator, n: int) -> float:
     """How far the stack moves points around the outer cage."""
     assert edit.outer is not None
-    p = Extended.of(edit.outer).points(on_cube(rng, n) * rng.uniform(1.001, 2.0, (n, 1)))
+    p = Extended.from_cage(edit.outer).points(on_cube(rng, n) * rng.uniform(1.001, 2.0, (n, 1)))
     p = p[~edit.outer.contains(p)]
     return float(np.abs(EditStack([edit]).to_canonical(p).points - p).max(initial=0.0))
 
@@ -208,8 +210,8 @@ def _moved(edit: Edit, rng: np.random.Generator, n: int) -> float:
 def _inside(edit: Edit, rng: np.random.Generator, n: int) -> float:
     """How far the stack's map of points in the inner cage is from the trilinear one."""
     xi = rng.uniform(-0.999, 0.999, (n, 3))
-    q = EditStack([edit]).to_canonical(Extended.of(edit.deformed).points(xi)).points
-    return float(np.abs(q - Extended.of(edit.inner).points(xi)).max())
+    q = EditStack([edit]).to_canonical(Extended.from_cage(edit.deformed).points(xi)).points
+    return float(np.abs(q - Extended.from_cage(edit.inner).points(xi)).max())
 
 
 def _round_trip(back: Callable[[Array], tuple[Array, Array]], q: Array, start: Array, size: float) -> float:

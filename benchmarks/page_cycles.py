@@ -59,9 +59,9 @@ class PageCycles:
             folder = Path(scratch) / "lumps"
             scene.save(folder)
             file = Path(scratch) / "lumps.html"
-            file.write_text(ScenePage.of(scene, "lumps").one_file(), encoding="utf-8")
+            file.write_text(ScenePage.build(scene, "lumps").one_file(), encoding="utf-8")
             editor, exported = self._editor(folder), self._pages(file.as_uri(), exported_page, ())
-            file.write_text(ScenePage.of(splats, "splats").one_file(), encoding="utf-8")
+            file.write_text(ScenePage.build(splats, "splats").one_file(), encoding="utf-8")
             exported_splats = self._pages(file.as_uri(), exported_page, ())
         parts = [
             "# Pages that are opened and closed",
@@ -129,7 +129,7 @@ class PageCycles:
     def _renderers(self, scene: Scene) -> list[Row]:
         camera = scene.cameras["test"][0].resized(60, 60)
         rows = []
-        made = ScenePage.of(scene, "scene").files
+        made = ScenePage.build(scene, "scene").files
         field, edits = made["field"], made["edits"]
         with field_page(splats=isinstance(scene.field, SplatField)) as page:
             page.page.evaluate(COUNT)

@@ -57,7 +57,7 @@ class SlowLine:
 
     def run(self) -> None:
         """Prints the table."""
-        page = ScenePage.of(Scene.open(self.scene), "scene")
+        page = ScenePage.build(Scene.open(self.scene), "scene")
         field = page.files["field"]
         coarse = bytes_until(field, "1.")
         rows = []

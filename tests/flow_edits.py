@@ -59,7 +59,9 @@ def shell_points(shell: FlowShell, n: int, seed: int = 0) -> Array:
     origin, frame = shell.outer.frame
     near = rng.uniform(-1.0, 1.0, (n // 3, 3))
     near *= rng.uniform(1.0, 1.2, (n // 3, 1)) / np.abs(near).max(axis=1, keepdims=True)
-    p = np.concatenate([origin + rng.random((n, 3)) @ frame.T, Extended.of(shell.deformed).points(near)])
+    p = np.concatenate(
+        [origin + rng.random((n, 3)) @ frame.T, Extended.from_cage(shell.deformed).points(near)]
+    )
     p = p[shell.outer.contains(p)]
     return p[~shell.deformed.contains(p)]
 

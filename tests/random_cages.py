@@ -83,7 +83,7 @@ def random_operation(rng: np.random.Generator, kind: int, reach: float) -> Opera
     choices: list[Operation] = [
         Translate(displacement(by, "by")),
         Rotate.from_rotation(rng.uniform(-1.0, 1.0, 3)),
-        Scale.of(np.exp(rng.uniform(-0.7, 0.7, 3))),
+        Scale.from_factors(np.exp(rng.uniform(-0.7, 0.7, 3))),
         Shear(xy=rng.uniform(-0.5, 0.5), zx=rng.uniform(-0.5, 0.5)),
         MoveCorner(int(rng.integers(8)), little),
         MoveEdge((2, 6), little),

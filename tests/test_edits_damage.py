@@ -46,7 +46,7 @@ def test_a_name_that_nothing_takes_is_refused_at_every_entry(
         Edit.move(INNER, name=name)
     with pytest.raises(EditFileError, match=message):
         parse_edits(text_of(name), format="json")
-    session = Session(Document.of([Edit.move(INNER)]), INNER.corners[[0, 7]], 0.1)
+    session = Session(Document.from_edits([Edit.move(INNER)]), INNER.corners[[0, 7]], 0.1)
     for attempt in (
         lambda: session.load_edits(text_of(name), append=True),
         lambda: session.change(1, name=name),

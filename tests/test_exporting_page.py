@@ -44,7 +44,7 @@ def test_the_page_shows_the_edited_scene_and_the_one_before(tmp_path: Path) -> N
     after, before = rendered(scene, camera), rendered(scene, camera, edits=False)
     assert psnr(after, before) < 30.0
     file = tmp_path / "scene.html"
-    file.write_text(ScenePage.of(scene, "lumps <&> @FIELD@").one_file(), encoding="utf-8")
+    file.write_text(ScenePage.build(scene, "lumps <&> @FIELD@").one_file(), encoding="utf-8")
     with shown(file) as page:
         assert page.title() == "lumps <&> @FIELD@"
         assert psnr(pixels(page), after) >= 40.0
@@ -59,7 +59,7 @@ def test_the_page_shows_the_edited_scene_and_the_one_before(tmp_path: Path) -> N
 def test_mouse_wheel_and_keys_move_the_camera(tmp_path: Path) -> None:
     scene = lumps_scene()
     file = tmp_path / "scene.html"
-    file.write_text(ScenePage.of(scene, "lumps").one_file(), encoding="utf-8")
+    file.write_text(ScenePage.build(scene, "lumps").one_file(), encoding="utf-8")
     with shown(file) as page:
         seen = [pixels(page)]
         first, target = orbit(page)
@@ -92,7 +92,7 @@ def orbit(page: Any) -> NDArray[np.float64]:
 
 def test_one_finger_turns_and_two_shift_and_pinch(tmp_path: Path) -> None:
     file = tmp_path / "scene.html"
-    file.write_text(ScenePage.of(lumps_scene(), "lumps").one_file(), encoding="utf-8")
+    file.write_text(ScenePage.build(lumps_scene(), "lumps").one_file(), encoding="utf-8")
     with shown(file, touch=True) as page:
         hand = Hand(page)
         eye, target = orbit(page)
@@ -119,7 +119,7 @@ def test_the_camera_path_is_played(tmp_path: Path) -> None:
     ring = turntable((0, 0, 0), 3.2, 6, elevation=0.4, width=SIZE, height=SIZE, fov_x=0.8)
     keys = tuple(Keyframe(tuple(camera.c2w.ravel()), 45.0, 1.0) for camera in ring[2:4])
     file = tmp_path / "scene.html"
-    file.write_text(ScenePage.of(scene, "lumps", keys).one_file(), encoding="utf-8")
+    file.write_text(ScenePage.build(scene, "lumps", keys).one_file(), encoding="utf-8")
     with shown(file) as page:
         page.press("body", " ")
         until(page, "!cagefieldViewer.viewer.plays")
@@ -148,7 +148,7 @@ def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
         Keyframe(pose, 45.0, 1.0, {1: 1.0, 2: 0.2, 3: 0.4}),
         Keyframe(pose, 45.0, 1.0, {1: 1.0, 2: 1.0, 3: 1.0}),
     )
-    page_of = ScenePage.of(scene, "lumps", keys)
+    page_of = ScenePage.build(scene, "lumps", keys)
     assert page_of.along is not None and page_of.along.states <= 37 and len(page_of.along.data) < 4e6
     # Half-way between states as exact as the lattices of the whole edits are.
     assert page_of.along.error[0] < 0.05 * scene.field.sample_spacing
@@ -257,7 +257,7 @@ def _as_shown(camera: Camera, fov_y_deg: float) -> Camera:
 def test_a_path_that_moves_no_edit_has_no_states() -> None:
     scene = lumps_scene()
     keys = tuple(Keyframe(tuple(camera.c2w.ravel()), 45.0) for camera in scene.cameras["train"])
-    assert "path" not in ScenePage.of(scene, "lumps", keys).files
+    assert "path" not in ScenePage.build(scene, "lumps", keys).files
 
 
 def test_parts_of_an_edit_that_are_impossible_are_named() -> None:
@@ -269,7 +269,7 @@ def test_parts_of_an_edit_that_are_impossible_are_named() -> None:
     pose = tuple(scene.cameras["test"][0].c2w.ravel())
     keys = (Keyframe(pose, 45.0, 1.0, {1: 0.0}), Keyframe(pose, 45.0, 1.0))
     with pytest.raises(EditError, match=r'shows an edit at \d+% of its way: edit "spin": .*outer'):
-        ScenePage.of(scene, "lumps", keys)
+        ScenePage.build(scene, "lumps", keys)
 
 
 def test_a_folder_shows_its_coarse_level_while_the_rest_loads(
@@ -315,7 +315,7 @@ def test_a_folder_shows_its_coarse_level_while_the_rest_loads(
 
 
 def test_a_folder_on_a_disk_says_how_it_is_opened(tmp_path: Path) -> None:
-    write_folder(tmp_path / "lumps", ScenePage.of(lumps_scene(), "lumps").folder())
+    write_folder(tmp_path / "lumps", ScenePage.build(lumps_scene(), "lumps").folder())
     with shown((tmp_path / "lumps" / INDEX).as_uri()) as page:
         until(page, "document.querySelector('.message').textContent.includes('open it by a web server')")
 

@@ -57,7 +57,7 @@ def test_the_page_shows_the_edited_splats_and_those_before(tmp_path: Path) -> No
     after, before = rendered(scene, camera), rendered(scene, camera, edits=False)
     assert psnr(after, before) < 30.0
     file = tmp_path / "scene.html"
-    file.write_text(ScenePage.of(scene, "splats").one_file(), encoding="utf-8")
+    file.write_text(ScenePage.build(scene, "splats").one_file(), encoding="utf-8")
     with shown(file) as page:
         assert psnr(pixels(page), after) >= 40.0
         page.press("body", "b")
@@ -87,7 +87,7 @@ def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
         Keyframe(pose, 45.0, 1.0, {1: 1.0, 2: 1.0, 3: 1.0}),
     )
     told: list[float] = []
-    page_of = ScenePage.of(scene, "splats", keys, on_progress=told.append)
+    page_of = ScenePage.build(scene, "splats", keys, on_progress=told.append)
     assert told == sorted(told) and len(told) > 15 and told[-1] == 1.0
     assert page_of.along is not None and page_of.along.states <= 19
     assert page_of.along.split
@@ -124,10 +124,10 @@ def test_the_more_splats_move_the_fewer_states_there_are(monkeypatch: pytest.Mon
     scene = splats_scene(TURN)
     pose = tuple(scene.cameras["test"][0].c2w.ravel())
     keys = (Keyframe(pose, 45.0, 2.0, {1: 0.0}), Keyframe(pose, 45.0, 1.0))
-    many = ScenePage.of(scene, "splats", keys).along
+    many = ScenePage.build(scene, "splats", keys).along
     assert many is not None and many.split
     monkeypatch.setattr("cagefield.pages.splat_path_states.BUDGET", 250_000)
-    few = ScenePage.of(scene, "splats", keys).along
+    few = ScenePage.build(scene, "splats", keys).along
     assert few is not None and not few.split
     assert many.states == 25 and 8 <= few.states < 20
     assert few.error[0] > 1.5 * many.error[0]
@@ -139,7 +139,7 @@ def test_a_folder_shows_its_coarse_level_while_the_rest_loads(
 ) -> None:
     monkeypatch.setattr("cagefield.pages.page_splats.FIRST", 1200)
     scene = splats_scene(MOVE)
-    page_of = ScenePage.of(scene, "splats")
+    page_of = ScenePage.build(scene, "splats")
     write_folder(tmp_path / "splats", page_of.folder())
     cuts = {NAMES["field"]: bytes_until(page_of.files["field"], "1.")}
     go_on = threading.Event()
@@ -175,7 +175,7 @@ def test_discs_are_refused_and_large_pages_warned_of(
     scene = splats_scene(count=100)
     discs = dataclasses.replace(scene, field=dataclasses.replace(scene.field, discs=True))
     with pytest.raises(CagefieldError, match=r"discs \(2DGS\), which pages do not draw; export them as .ply"):
-        ScenePage.of(discs, "discs")
+        ScenePage.build(discs, "discs")
     discs.save(tmp_path / "discs")
     line = refused(capsys, "export", tmp_path / "discs", "-o", tmp_path / "x.html")
     assert "are discs (2DGS)" in line and not (tmp_path / "x.html").exists()
@@ -196,7 +196,7 @@ def test_genuine_splats(tmp_path: Path) -> None:
     edit = Edit.move(Cage.box(field.center, 0.5 * field.half_size))
     scene = Scene(field, EditStack([edit.translate((0.0, -radius, 0.0))]), {"test": seen[:1]})
     file = tmp_path / "scene.html"
-    file.write_text(ScenePage.of(scene, "fruit").one_file(), encoding="utf-8")
+    file.write_text(ScenePage.build(scene, "fruit").one_file(), encoding="utf-8")
     with shown(file) as page:
         assert psnr(pixels(page), rendered(scene, seen[0])) >= 40.0
         page.press("body", "b")
@@ -227,7 +227,7 @@ def test_renderers_of_splats_that_are_opened_and_closed_leave_nothing() -> None:
 def test_a_page_of_many_splats_may_have_them_sorted_beside_it(tmp_path: Path) -> None:
     file = tmp_path / "scene.html"
     file.write_text(
-        ScenePage.of(splats_scene(count=33_000, smaller=4.0), "many").one_file(), encoding="utf-8"
+        ScenePage.build(splats_scene(count=33_000, smaller=4.0), "many").one_file(), encoding="utf-8"
     )
     with shown(file) as page:
         page.mouse.move(60, 60)

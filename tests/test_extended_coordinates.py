@@ -30,7 +30,7 @@ def bent_cages(nearness: float, corners: int, count: int) -> list[Cage]:
 
 
 def bends_of(cages: list[Cage]) -> Array:
-    return np.stack([Extended.of(cage).bend for cage in cages])
+    return np.stack([Extended.from_cage(cage).bend for cage in cages])
 
 
 @pytest.mark.parametrize("nearness", [0.7, 0.95, 0.99])
@@ -45,7 +45,7 @@ def test_space_goes_on_around_nearly_all_cages_with_every_corner_dragged() -> No
 def test_coordinates_are_found_again_around_cages_bent_to_the_limit() -> None:
     rng = np.random.default_rng(0)
     for cage in bent_cages(0.99, 1, 12) + bent_cages(0.95, 8, 12):
-        place = Extended.of(cage)
+        place = Extended.from_cage(cage)
         if not place.is_one_to_one:
             continue
         xi = rng.uniform(-2.5, 2.5, (400, 3))
@@ -61,7 +61,7 @@ def test_coordinates_are_found_again_around_cages_bent_to_the_limit() -> None:
 def test_it_is_the_trilinear_map_in_the_cage_and_goes_on_without_a_jump() -> None:
     rng = np.random.default_rng(1)
     for cage in bent_cages(0.95, 2, 6):
-        place, u = Extended.of(cage), rng.random((20, 3))
+        place, u = Extended.from_cage(cage), rng.random((20, 3))
         xi = 2.0 * u - 1.0
         expected = [trilinear(cage.corners, each) for each in u]
         np.testing.assert_allclose(place.points(xi), expected, atol=1e-12)

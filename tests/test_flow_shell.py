@@ -44,7 +44,7 @@ def face_points(cage: Cage, n: int, seed: int = 0) -> tuple[Array, Array]:
     rng = np.random.default_rng(seed)
     xi = rng.uniform(-1.0, 1.0, (n, 3))
     xi[np.arange(n), rng.integers(3, size=n)] = rng.choice([-1.0, 1.0], n)
-    return Extended.of(cage).points(xi), xi
+    return Extended.from_cage(cage).points(xi), xi
 
 
 def check_map(edit: Edit, n: int = 80, tolerance: float = 2e-5) -> None:
@@ -61,7 +61,7 @@ def check_map(edit: Edit, n: int = 80, tolerance: float = 2e-5) -> None:
     np.testing.assert_allclose(inverse @ J, np.broadcast_to(np.eye(3), J.shape), atol=1e-5)
     # On the inner cage's faces it is phi, up to the integration's error: the aim is 1e-4 of the scene.
     on_inner, xi = face_points(shell.deformed, 60)
-    expected = Extended.of(shell.inner).points(xi)
+    expected = Extended.from_cage(shell.inner).points(xi)
     assert np.abs(shell.to_canonical(on_inner)[0] - expected).max() < tolerance * scene
     # On the outer cage's it is the identity, up to the rounding of where the face is.
     on_outer, _ = face_points(shell.outer, 60)
@@ -142,7 +142,7 @@ def test_continuous_across_both_cages(name: str) -> None:
     warp = edit.warp
     for cage, tolerance in ((shell.deformed, 1e-5), (shell.outer, 1e-6)):
         _, xi = face_points(cage, 200)
-        place = Extended.of(cage)
+        place = Extended.from_cage(cage)
         inside, outside = place.points(xi * (1 - 1e-7)), place.points(xi * (1 + 1e-7))
         jump = np.abs(warp.to_canonical(inside).points - warp.to_canonical(outside).points)
         # 1e-7 of a distance times the stretch, and at the inner cage the integration's error.
@@ -161,8 +161,8 @@ def test_cage_stays_inside_the_outer_cage_all_the_way(edit: Edit) -> None:
     for n, t in enumerate(times):
         assert motion.outer.contains(Extended(c[n], F[n], motion.bend(t)).points(xi)).all()
     first, last = Extended(c[0], F[0], motion.bend(0)), Extended(c[-1], F[-1], motion.bend(1))
-    np.testing.assert_allclose(first.points(xi), Extended.of(edit.inner).points(xi), atol=1e-12)
-    np.testing.assert_allclose(last.points(xi), Extended.of(edit.deformed).points(xi), atol=1e-12)
+    np.testing.assert_allclose(first.points(xi), Extended.from_cage(edit.inner).points(xi), atol=1e-12)
+    np.testing.assert_allclose(last.points(xi), Extended.from_cage(edit.deformed).points(xi), atol=1e-12)
 
 
 def test_a_rod_in_a_slot_turns_by_shrinking_just_enough() -> None:

@@ -49,7 +49,7 @@ def test_the_stand_in_refuses_what_a_round_trip_does() -> None:
 @pytest.mark.parametrize("kind", KINDS, ids=str)
 def test_edited_rays_are_traced_without_the_host(kind: dict[str, Any], calls: list[tuple[Any, ...]]) -> None:
     field = TorchNerf(small_field(**kind), FAR)
-    parts = trace(field, Rays.of(CAMERA, FAR), EDITS)
+    parts = trace(field, Rays.from_camera(CAMERA, FAR), EDITS)
     assert [(part.device.type, tuple(part.shape)) for part in parts] == [
         ("meta", (30, 3)), ("meta", (30,)), ("meta", (30,)),
     ]  # fmt: skip
@@ -63,7 +63,7 @@ def test_a_training_step_goes_forward_and_back_without_the_host(
     kind: dict[str, Any], calls: list[tuple[Any, ...]]
 ) -> None:
     field = TorchNerf(small_field(**kind), FAR, trainable=True)
-    coarse, fine = march(field, Rays.of(CAMERA, FAR), jitter=Jitter(1.0))
+    coarse, fine = march(field, Rays.from_camera(CAMERA, FAR), jitter=Jitter(1.0))
     optimizer = torch.optim.Adam(field.parameters)
     (coarse.premultiplied.mean() + fine.premultiplied.mean()).backward()
     optimizer.step()

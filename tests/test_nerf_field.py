@@ -238,7 +238,7 @@ def test_an_ndc_picture_is_the_one_from_ndc_rays() -> None:
     alpha = 1 - np.exp(-sigma.reshape(z.shape) * length)
     weights = alpha * np.cumprod(np.concatenate([np.ones((36, 1)), 1 - alpha + 1e-10], 1), 1)[:, :-1]
     expected = (weights[..., None] * rgb.reshape(36, 12, 3)).sum(1)
-    coarse, _ = march(field.torch, Rays.of(camera, field.torch.device))
+    coarse, _ = march(field.torch, Rays.from_camera(camera, field.torch.device))
     # float32 positions up to 1e6 away; the last sample stops 1e-6 before infinity
     np.testing.assert_allclose(coarse.premultiplied.cpu().numpy(), expected, atol=1e-4)
 
@@ -334,7 +334,7 @@ def test_emptied_samples_have_no_density() -> None:
 def test_pixels_may_be_chosen() -> None:
     field = small_field()
     pixels = np.array([[3, 1], [0, 7]])
-    rgb, opacity, depth = trace(field.torch, Rays.of(camera(), field.torch.device, pixels))
+    rgb, opacity, depth = trace(field.torch, Rays.from_camera(camera(), field.torch.device, pixels))
     whole = NerfRenderer(field).render(camera(), background="black")
     np.testing.assert_allclose(rgb.cpu().numpy(), [whole.rgb[1, 3], whole.rgb[7, 0]], atol=1e-6)
     np.testing.assert_allclose(depth.cpu().numpy(), [whole.depth[1, 3], whole.depth[7, 0]], rtol=1e-5)
@@ -345,7 +345,7 @@ def test_lindisp_samples_are_even_in_disparity() -> None:
     from cagefield.rendering.nerf.nerf_renderer import stratified_samples
 
     field = small_field(lindisp=True, near=1.0, far=4.0, samples=(4, 0))
-    s = stratified_samples(field, Rays.of(camera(1), field.torch.device), 4, None)
+    s = stratified_samples(field, Rays.from_camera(camera(1), field.torch.device), 4, None)
     np.testing.assert_allclose(1 / s[0].cpu(), [1.0, 0.75, 0.5, 0.25], rtol=1e-6)
 
 
@@ -360,7 +360,7 @@ def in_float64(field: NerfField) -> TorchNerf:
 def numeric_normals(field: NerfField, camera: Camera, edits: EditStack | None) -> np.ndarray:
     """Normals [N,3] by central differences of the edited sigma, at the renderer's samples and weights."""
     device = field.torch.device
-    rays = Rays.of(camera, device)
+    rays = Rays.from_camera(camera, device)
     mapped = None if edits is None else TensorMap(edits, device, preserve_opacity=False)
     double = in_float64(field)
 

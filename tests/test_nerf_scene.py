@@ -371,7 +371,7 @@ def test_the_published_chair_is_as_close_to_the_photos_as_its_training_was() -> 
     scores = []
     for view, camera in list(zip(dataset.test, found.cameras["test"], strict=True))[::17]:
         j, i = (grid.ravel() for grid in np.meshgrid(*[np.arange(0, 400, 16)] * 2, indexing="ij"))
-        rays = Rays.of(camera, found.field.torch.device, np.stack([i, j], 1))
+        rays = Rays.from_camera(camera, found.field.torch.device, np.stack([i, j], 1))
         rgb, opacity, _ = (values.numpy() for values in trace(found.field.torch, rays))
         photo = view.load()[j, i] / 255.0
         photo = photo[:, :3] * photo[:, 3:] + 1 - photo[:, 3:]

@@ -191,7 +191,7 @@ def test_the_other_scene_is_pasted_as_it_is_edited(folder: Path, tmp_path: Path)
     twice = Edit.paste(str(tmp_path / "nested"), size).replace(relight="none").scale(0.5 / 1.4 / 0.6)
     pictures = [
         scene.with_edits(EditStack([edit.then(Rotate(TURN)).translate(BY)])).render(view())
-        for edit in (pasted(0.5).replace(operations=(Scale.of(0.5),)), once, twice)
+        for edit in (pasted(0.5).replace(operations=(Scale.from_factors(0.5),)), once, twice)
     ]
     # Content that was enlarged first lies between the vertices of a coarser grid.
     assert db(pictures[0].opacity, pictures[1].opacity) > 32.0

@@ -228,7 +228,7 @@ def test_harmonic_grid_lies_along_a_turned_outer_cage() -> None:
     cages = [Cage(b + cage.corners @ A.T) for cage in (INNER, MOVED.deformed, OUTER)]
     p = shell_points(MOVED, 300)
     # The same grid, turned: equal but for its solver's tolerance.
-    turned = HarmonicShell.of(*cages).to_canonical(b + p @ A.T)[0]
+    turned = HarmonicShell.from_cages(*cages).to_canonical(b + p @ A.T)[0]
     np.testing.assert_allclose(turned, b + shell("harmonic", MOVED)(p)[0] @ A.T, atol=1e-5)
 
 

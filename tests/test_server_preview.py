@@ -46,7 +46,7 @@ KEYS = (key(0.0, e1=0.0), key(1.0))
 
 
 def session(*edits: Edit, keys: tuple[Keyframe, ...] = KEYS, loop: bool = False) -> Session:
-    return Session(Document.of(edits, keys=keys, loop=loop), BOUNDS, 0.01)
+    return Session(Document.from_edits(edits, keys=keys, loop=loop), BOUNDS, 0.01)
 
 
 # ---- the session ----

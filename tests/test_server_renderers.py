@@ -308,7 +308,7 @@ KEYS = tuple(
 
 def test_edits_are_blended_along_a_path() -> None:
     gone = Edit.delete(Cage.box((0.5, 0, 0), 0.1))
-    document = Document.of([MOVED, gone, MOVED.replace(enabled=False)], keys=KEYS)
+    document = Document.from_edits([MOVED, gone, MOVED.replace(enabled=False)], keys=KEYS)
     assert edits_at_time(document, {1: 0.0, 2: 0.0}) == ()
     half = edits_at_time(document, {1: 0.5, 2: 0.5})
     np.testing.assert_allclose(half[0].deformed.pivot, (0.125, 0, 0))
@@ -317,7 +317,7 @@ def test_edits_are_blended_along_a_path() -> None:
 
 
 def test_jobs_refuse_what_they_could_not_write(tmp_path: Path) -> None:
-    document = Document.of([], keys=KEYS)
+    document = Document.from_edits([], keys=KEYS)
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "a").write_text("")
     (tmp_path / "a.mp4").write_text("")

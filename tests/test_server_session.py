@@ -37,7 +37,7 @@ CUP = Edit.move(Cage.box((0.6, 0, 0), 0.2), name="cup")
 
 
 def session(*edits: Edit) -> Session:
-    return Session(Document.of(edits), BOUNDS, 0.01)
+    return Session(Document.from_edits(edits), BOUNDS, 0.01)
 
 
 def test_a_new_session_is_saved_and_at_the_beginning_of_its_history() -> None:
@@ -63,7 +63,7 @@ def test_a_cancelled_drag_leaves_everything_as_it_was() -> None:
     s.drag_begin(1, 4, 1, "field")
     s.drag(1, 4, Translate((0.1, 0, 0)))
     s.drag_cancel(1)
-    assert s.shown == s.document == Document.of([ARM])
+    assert s.shown == s.document == Document.from_edits([ARM])
     assert s.history.names == ("Open",)
 
 
@@ -166,7 +166,7 @@ def test_an_operation_from_numbers_is_done_whole_or_not_at_all() -> None:
     s = session(ARM)
     with pytest.raises(EditError, match=r"must stay inside the outer cage.*% of it is possible"):
         s.apply(1, "field", Translate((0.6, 0, 0)))
-    assert s.document == Document.of([ARM])
+    assert s.document == Document.from_edits([ARM])
 
 
 def test_moves_one_after_the_other_become_one_operation_others_do_not() -> None:

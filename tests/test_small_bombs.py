@@ -101,7 +101,7 @@ def test_lattices_have_a_limit_together() -> None:
     with pytest.raises(EditError, match="million nodes together"):
         EditStack([*one, *one]).check()
     two = [*one, one[0].replace(lattice=None)]
-    session = Session(Document.of(two), np.array([[-1.0] * 3, [1.0] * 3]), 0.1)
+    session = Session(Document.from_edits(two), np.array([[-1.0] * 3, [1.0] * 3]), 0.1)
     for attempt in (lambda: session.change(2, lattice=512), lambda: session.duplicate(1)):
         with pytest.raises(EditError, match="million nodes together"):
             attempt()

@@ -51,7 +51,7 @@ def views() -> dict[str, Camera]:
 def test_pictures_are_the_same_bit_for_bit(name: str, region: tuple[int, int, int, int] | None) -> None:
     splats, view = many(), views()[name]
     plain = project(splats, view, near=NEAR, region=region)
-    culled = project(splats, view, near=NEAR, region=region, clusters=Clusters.of(splats))
+    culled = project(splats, view, near=NEAR, region=region, clusters=Clusters.build(splats))
     np.testing.assert_array_equal(culled.order, plain.order)
     np.testing.assert_array_equal(culled.picture(DEPTH), plain.picture(DEPTH))
     assert len(plain.order) > 20, "the picture shows too little"
@@ -63,13 +63,13 @@ def test_splats_of_all_kinds_are_kept(antialiased: bool) -> None:
     splats = all_kinds(view.origin, antialiased=antialiased)
     plain = project(splats, view, near=NEAR).picture(DEPTH)
     np.testing.assert_array_equal(
-        project(splats, view, near=NEAR, clusters=Clusters.of(splats)).picture(DEPTH), plain
+        project(splats, view, near=NEAR, clusters=Clusters.build(splats)).picture(DEPTH), plain
     )
 
 
 def seen_by(clusters: Clusters, view: Camera, detail: float = 0.0) -> list[NDArray[np.int32]]:
     lens = intrinsics(view)
-    frustum = View.of(
+    frustum = View.from_region(
         view.origin, world_to_camera(view), lens.focal, lens.centre, (view.width, view.height), lens.limits,
         NEAR, pinhole=True,
     )  # fmt: skip
@@ -79,7 +79,7 @@ def seen_by(clusters: Clusters, view: Camera, detail: float = 0.0) -> list[NDArr
 def test_what_is_out_of_sight_is_not_projected() -> None:
     splats = many(60_000)
     for name in ("narrow", "inside"):
-        (rows,) = seen_by(Clusters.of(splats), views()[name])
+        (rows,) = seen_by(Clusters.build(splats), views()[name])
         shown = project(splats, views()[name], near=NEAR).order
         assert np.isin(shown, rows).all()
         # 234 clusters of splats a tenth of the box wide: most of the box is near the frustum.
@@ -95,7 +95,7 @@ def test_dilogarithm_is_scipys() -> None:
 def test_representatives_keep_the_moments() -> None:
     """Against sums in float64: mean, covariance and colour of each group, its optical depth."""
     splats = many(2000)
-    clusters = Clusters.of(splats)
+    clusters = Clusters.build(splats)
     fine, coarse = clusters.levels
     values = [np.asarray(v, np.float64) for v in (splats.means, splats.covariances, splats.sh)]
     means, covariances, sh = (v[clusters.order] for v in values)
@@ -136,7 +136,7 @@ def test_coincident_splats_are_as_opaque_as_one_after_the_other(width: float, an
     )  # fmt: skip
     splats = DeformedSplats.of_field(field)
     each = project(splats, view, near=NEAR).picture(DEPTH)[..., 0]
-    merged = project(splats, view, near=NEAR, clusters=Clusters.of(splats), detail=1.0)
+    merged = project(splats, view, near=NEAR, clusters=Clusters.build(splats), detail=1.0)
     if antialiased and width < 0.1:
         assert not len(merged.order) and (each == 1.0).all()
         return
@@ -150,7 +150,7 @@ def test_representatives_where_groups_lie_within_a_pixel() -> None:
     """Far away, few are drawn, and the light that is let through stays what it was."""
     field = ball_of_splats(40_000)
     splats = DeformedSplats.of_field(field)
-    clusters = Clusters.of(splats)
+    clusters = Clusters.build(splats)
     view = Camera.look_at((0.0, -9.0, 2.0), (0, 0, 0), width=48, height=48, fov_x=0.2)
     plain = project(splats, view, near=NEAR)
     few = project(splats, view, near=NEAR, clusters=clusters, detail=1.0)
@@ -182,21 +182,21 @@ def test_a_renderer_uses_them_with_edits_too(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_clusters_are_made_once_and_in_the_order_of_others() -> None:
     splats = many(1000)
-    first = Clusters.of(splats)
-    assert Clusters.of(splats) is first
+    first = Clusters.build(splats)
+    assert Clusters.build(splats) is first
     moved = replace(splats, means=splats.means + np.float32(1.0))
-    assert Clusters.of(moved, first).order is first.order
+    assert Clusters.build(moved, first).order is first.order
     assert len(first.boxes) == -(-1000 // CLUSTER) and sorted(first.order) == list(range(1000))
     none = DeformedSplats(splats.means[:0], splats.covariances[:0], splats.opacities[:0], splats.sh[:0])
-    assert project(none, camera(), near=NEAR, clusters=Clusters.of(none), detail=1.0).pairs == 0
+    assert project(none, camera(), near=NEAR, clusters=Clusters.build(none), detail=1.0).pairs == 0
     assert splat_lod.LEAST > CLUSTER
 
 
 def test_clusters_do_not_keep_their_splats_in_memory() -> None:
     """Each state of a drag has splats of its own."""
     splats = all_kinds(camera().origin)
-    clusters, alive = Clusters.of(splats), ref(splats)
-    assert len(clusters.levels) > 0 and Clusters.of(splats) is clusters
+    clusters, alive = Clusters.build(splats), ref(splats)
+    assert len(clusters.levels) > 0 and Clusters.build(splats) is clusters
     del splats
     gc.collect()
     assert alive() is None

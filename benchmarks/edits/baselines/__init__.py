@@ -28,8 +28,8 @@ class BackwardShell(Protocol):
 
 
 PEERS: dict[str, Callable[[Cage, Cage, Cage], BackwardShell]] = {
-    "mean value": MeanValueShell.of,
-    "harmonic": HarmonicShell.of,
+    "mean value": MeanValueShell.from_cages,
+    "harmonic": HarmonicShell.from_cages,
 }
 """Peer by name: called with (canonical inner, deformed inner, outer) cages."""
 

@@ -45,7 +45,7 @@ class HarmonicShell:
     resolution: int = RESOLUTION
 
     @classmethod
-    def of(cls, inner: Cage, deformed: Cage, outer: Cage) -> HarmonicShell:
+    def from_cages(cls, inner: Cage, deformed: Cage, outer: Cage) -> HarmonicShell:
         """The shell map on the usual grid."""
         return cls(HexahedronMap(inner, deformed), outer)
 

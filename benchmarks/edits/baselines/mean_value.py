@@ -159,7 +159,7 @@ class MeanValueShell:
     splits: tuple[int, int]
 
     @classmethod
-    def of(cls, inner: Cage, deformed: Cage, outer: Cage) -> MeanValueShell:
+    def from_cages(cls, inner: Cage, deformed: Cage, outer: Cage) -> MeanValueShell:
         """The shell map; faces are split where they, or phi on them, are not those of two triangles."""
         phi = HexahedronMap(inner, deformed)
         exact = phi.affine is not None and _is_planar(deformed)

@@ -120,7 +120,7 @@ class Export:
         path = self.scene / "camera_path.json"
         keys, loop = load_keys(path) if path.exists() else ((), False)
         with progress_bar("Edits along the path") as move:
-            page = ScenePage.of(
+            page = ScenePage.build(
                 scene,
                 real_path(self.scene).name,
                 keys,

@@ -36,7 +36,7 @@ class _Content:
     lengths: str
 
     @classmethod
-    def of(cls, field: VoxelField | SplatField) -> _Content:
+    def from_field(cls, field: VoxelField | SplatField) -> _Content:
         if isinstance(field, SplatField):
             positions = field.means.astype(np.float64)
             return cls("splats", positions, field.opacities, field.sample_spacing, "splat widths")
@@ -55,7 +55,7 @@ def describe_edits(edits: Iterable[Edit], field: VoxelField | SplatField) -> lis
     The shares are of the field's stored voxels, or of its splats' opacities, inside the canonical inner cage
     and in the shell around it. An edit that cannot be evaluated says why.
     """
-    content = _Content.of(field)
+    content = _Content.from_field(field)
     lines: list[str] = []
     for number, edit in enumerate(edits, start=1):
         lines += [f"{number}. {_title(edit)}", *("   " + line for line in _details(edit, content))]

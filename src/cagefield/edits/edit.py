@@ -172,7 +172,7 @@ class Edit(ABC):
 
     def scale(self: AnyEdit, by: ArrayLike, *, axes: Axes = "world") -> AnyEdit:
         """The edit with its inner cage scaled about its pivot by one factor or three."""
-        return self.then(ops.Scale.of(by, axes))
+        return self.then(ops.Scale.from_factors(by, axes))
 
     def shear(self: AnyEdit, *, axes: Axes = "world", **factors: float) -> AnyEdit:
         """The edit with its inner cage sheared about its pivot; factors xy, xz, yx, yz, zx, zy."""

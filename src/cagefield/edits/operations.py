@@ -90,7 +90,7 @@ class Scale:
     noun: ClassVar[str] = "scaling"
 
     @classmethod
-    def of(cls, by: ArrayLike, axes: Axes = "world") -> Scale:
+    def from_factors(cls, by: ArrayLike, axes: Axes = "world") -> Scale:
         """Scaling by one factor or three."""
         return cls(_triple(factors(by, "scale")), axes)
 

@@ -39,7 +39,7 @@ def placed_paste(
     edit = Edit.paste(source, Cage.box(0.5 * (low + high), high - low), name=name)
     if size is not None:
         factor = float(size / (high - low).max())
-        edit = edit.then(Scale.of(float(f"{factor:.6g}")))
+        edit = edit.then(Scale.from_factors(float(f"{factor:.6g}")))
     up, turn = np.asarray(up, np.float64), upright_turn(source_up, up)
     if turn.magnitude() > np.radians(MIN_TILT_DEGREES):
         x, y, z = np.round(euler_degrees(turn), _OPERATION_DECIMALS).tolist()

@@ -57,7 +57,7 @@ class PathState:
     places: tuple[int, ...]
 
     @classmethod
-    def of(cls, edits: EditMap) -> PathState:
+    def from_edits(cls, edits: EditMap) -> PathState:
         """Raises EditError for a stack that cannot be evaluated."""
         return cls(edits.steps, DeviceStack.from_stack(edits), edits.places)
 

@@ -88,7 +88,7 @@ class SplatPathState:
     gains: NDArray[np.int32]
 
     @classmethod
-    def of(cls, field: SplatField, changed: ChangedSplats, split: Split | None) -> SplatPathState:
+    def build(cls, field: SplatField, changed: ChangedSplats, split: Split | None) -> SplatPathState:
         """State of the difference that edits make to a field, with its `split` splats."""
         order = page_order(field)
         place = np.empty(len(order), np.int32)

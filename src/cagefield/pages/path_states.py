@@ -91,7 +91,7 @@ def path_edits(
     stacks = {parts: stack_at(whole, parts, moving, nodes, on_way) for parts in unique}
     middles = [k for k in range(len(knots) - 1) if knots[k] != knots[k + 1]]
     total = len(stacks) + len(middles)
-    states = {parts: PathState.of(stack) for parts, stack in stacks.items()}
+    states = {parts: PathState.from_edits(stack) for parts, stack in stacks.items()}
     found: list[Occupancy] = []
     errors: list[NDArray[np.float64]] = []
     for stack in stacks.values():
@@ -104,7 +104,7 @@ def path_edits(
         found.append(renderer.occupancy)
         one, other = states[knots[k]], states[knots[k + 1]]
         if mixable(one, other):
-            errors.append(_distances(PathState.of(middle), one, other))
+            errors.append(_distances(PathState.from_edits(middle), one, other))
         on_progress(len(found) / total)
     data = encode_page_path(
         renderer.field,

@@ -65,7 +65,7 @@ class ScenePage:
     along: PathEdits | None
 
     @classmethod
-    def of(
+    def build(
         cls,
         scene: Scene,
         title: str,

@@ -48,7 +48,7 @@ def splat_path_edits(
 
     def state(stack: PreparedStack) -> SplatPathState:
         changed = changed_splats(field, stack, preserve_opacity=preserve_opacity, split=split)
-        return SplatPathState.of(field, changed, split)
+        return SplatPathState.build(field, changed, split)
 
     line = Timeline(keys, loop=loop)
     wanted = state_times(line, edits, MOST_STATES)

@@ -69,7 +69,7 @@ def _against_nerf(
         step = max(1, round((camera.width * camera.height / PIXELS) ** 0.5))
         j, i = np.meshgrid(np.arange(0, camera.height, step), np.arange(0, camera.width, step), indexing="ij")
         pixels = np.stack([i.ravel(), j.ravel()], axis=1)
-        rgb, opacity, _ = trace(original.torch, Rays.of(camera, original.torch.device, pixels))
+        rgb, opacity, _ = trace(original.torch, Rays.from_camera(camera, original.torch.device, pixels))
         exact = rgb.cpu().numpy() + (1.0 - opacity.cpu().numpy()[:, None]) * np.array(behind, np.float32)
         frame = renderer.render(camera, background=behind)
         if frame is not None:

@@ -51,7 +51,7 @@ class Motion:
 
     def __post_init__(self) -> None:
         for name, cage in (("start", self.inner), ("end", self.deformed), ("confines", self.outer)):
-            object.__setattr__(self, name, Extended.of(cage))
+            object.__setattr__(self, name, Extended.from_cage(cage))
 
     @cached_property
     def is_affine(self) -> bool:
@@ -218,7 +218,7 @@ def may_bend(inner: Cage, corners: Array) -> Mask:
     """Mask [B] of the valid cages [B,8,3] that the inner cage can become with its bend one to one."""
     C = hexahedron.coefficients(corners)
     ends = bends(C, np.transpose(C[:, AXES], (0, 2, 1)))
-    start = Extended.of(inner).bend
+    start = Extended.from_cage(inner).bend
     if not (start.any() or ends.any()):
         return np.ones(len(corners), dtype=bool)
     return stay_one_to_one(start, ends)
@@ -236,7 +236,7 @@ def gaps(corners: Array, confines: Extended, points: int = 124) -> Array:
 
 @lru_cache(maxsize=64)
 def _gap_between(cage: Cage, outer: Cage) -> float:
-    return float(gaps(cage.corners[None], Extended.of(outer))[0])
+    return float(gaps(cage.corners[None], Extended.from_cage(outer))[0])
 
 
 def _surface(nodes: int) -> Array:

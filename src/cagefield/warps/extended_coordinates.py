@@ -27,7 +27,7 @@ class Extended:
 
     @staticmethod
     @lru_cache(maxsize=64)
-    def of(cage: Cage) -> Extended:
+    def from_cage(cage: Cage) -> Extended:
         """The coordinates of a cage at rest."""
         C = hexahedron.coefficients(cage.corners)
         F = np.ascontiguousarray(C[AXES].T)

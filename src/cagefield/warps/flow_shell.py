@@ -144,10 +144,10 @@ class FlowShell:
         Corners that no cage may have are False. Where not fine, only the corners are tested, and edges or
         faces that come too near to a bent outer cage are missed.
         """
-        mask = np.asarray(gaps(corners, Extended.of(outer), 8) >= LEAST_GAP)
+        mask = np.asarray(gaps(corners, Extended.from_cage(outer), 8) >= LEAST_GAP)
         mask[mask] = are_valid(corners[mask])
-        if fine and not Extended.of(outer).is_affine:
-            mask[mask] = gaps(corners[mask], Extended.of(outer)) >= LEAST_GAP
+        if fine and not Extended.from_cage(outer).is_affine:
+            mask[mask] = gaps(corners[mask], Extended.from_cage(outer)) >= LEAST_GAP
         mask[mask] = may_bend(inner, corners[mask])
         return mask
 

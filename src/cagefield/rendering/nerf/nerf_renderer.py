@@ -51,7 +51,7 @@ class Rays(NamedTuple):
     cosines: Tensor
 
     @classmethod
-    def of(cls, camera: Camera, device: torch.device, pixels: Any = None) -> Rays:
+    def from_camera(cls, camera: Camera, device: torch.device, pixels: Any = None) -> Rays:
         """The rays of a camera's pixels [N,2] (column, row), all of them row by row if left out."""
         origins, directions = camera.rays() if pixels is None else camera.rays(pixels)
         cosines = (directions @ camera.forward).astype(np.float32)
@@ -100,7 +100,7 @@ class NerfRenderer:
         self, camera: Camera, *, background: Background = "white", normals: bool = False
     ) -> RenderResult:
         """Image of the field seen by `camera`."""
-        rays = Rays.of(camera, self.field.torch.device)
+        rays = Rays.from_camera(camera, self.field.torch.device)
         columns = _traced(self.field.torch, rays, self.edits, self.chunk_rays, self.preserve_opacity, normals)
         shape = (camera.height, camera.width)
         premultiplied, opacity, depth, normal = (

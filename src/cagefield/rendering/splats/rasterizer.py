@@ -206,7 +206,7 @@ def project(
     if clusters is None:
         sources = [_Source(splats, np.arange(len(splats), dtype=np.int32))]
     else:
-        view = View.of(
+        view = View.from_region(
             origin, W, lens.focal, lens.centre - (x, y), (width, height), lens.limits, near,
             pinhole=lens.model == projection.PINHOLE,
         )  # fmt: skip

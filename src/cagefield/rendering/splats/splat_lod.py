@@ -49,7 +49,7 @@ class View:
     near: float
 
     @classmethod
-    def of(
+    def from_region(
         cls,
         origin: NDArray[np.float64],
         W: NDArray[np.float64],
@@ -109,7 +109,7 @@ class Clusters:
     boxes: Float32
 
     @classmethod
-    def of(cls, splats: DeformedSplats, like: Clusters | None = None) -> Clusters:
+    def build(cls, splats: DeformedSplats, like: Clusters | None = None) -> Clusters:
         """The clusters of splats, made once while they live; in the order of others of as many splats."""
         found = _known.get(splats)
         if found is None:

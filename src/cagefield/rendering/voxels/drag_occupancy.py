@@ -59,7 +59,7 @@ class Chain:
     _starts: dict[tuple[int, ...], NDArray[np.float32]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, edits: EditMap, place: int, canonical: Occupancy, grid: DeviceGrid) -> Chain:
+    def build(cls, edits: EditMap, place: int, canonical: Occupancy, grid: DeviceGrid) -> Chain:
         """The chain around a place among the active edits, none of which is discrete."""
         active = edits.steps
         earlier = DeviceStack.from_stack(PreparedStack(active[:place]))

@@ -111,7 +111,7 @@ class VoxelRenderer:
             place = replaced(before.edits, self.edits)
             if place is not None:
                 if self._chain is None or not self._chain.fits(self.edits, place):
-                    self._chain = Chain.of(self.edits, place, self._canonical, self.grid)
+                    self._chain = Chain.build(self.edits, place, self._canonical, self.grid)
                 link = self._chain.link(self.edits.steps[place])
         self._coarse = coarse
         self.occupancy = deform(self._canonical, self.grid, stack, jumps, known, coarse, proceed, link)

@@ -44,7 +44,7 @@ class Document:
     loop: bool = False
 
     @classmethod
-    def of(
+    def from_edits(
         cls,
         edits: Iterable[Edit],
         *,

@@ -14,7 +14,7 @@ _WORDS = {"translation": "Move", "rotation": "Rotate", "scaling": "Scale", "shea
 
 def edit_label(operation: Operation, target: Target, entry: Entry) -> str:
     """An operation as the history lists it."""
-    return f"{_WORDS.get(operation.noun, operation.noun.capitalize())}{_TARGETS[target]}{of(entry)}"
+    return f"{_WORDS.get(operation.noun, operation.noun.capitalize())}{_TARGETS[target]}{suffix_for(entry)}"
 
 
 def option_word(name: str) -> str:
@@ -22,7 +22,7 @@ def option_word(name: str) -> str:
     return _OPTIONS.get(name, name)
 
 
-def of(entry: Entry) -> str:
+def suffix_for(entry: Entry) -> str:
     """ " of NAME", or of the edit's number where it has no name."""
     return f" of {entry.edit.name}" if entry.edit.name else f" of edit {entry.id}"
 

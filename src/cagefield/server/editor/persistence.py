@@ -89,7 +89,7 @@ class SceneStore:
         loop = False
         if (self.path / CAMERA_PATH).exists():
             keys, loop = load_keys(self.path / CAMERA_PATH)
-        return Document.of(
+        return Document.from_edits(
             absolute(self.scene.edits, self.origin),
             preserve_opacity=self.scene.preserve_opacity,
             keys=keys,
@@ -352,7 +352,7 @@ def _parsed(content: dict[str, object]) -> Document:
         )
         for key in content["keys"]  # type: ignore[attr-defined]
     )
-    document = Document.of(
+    document = Document.from_edits(
         stack, preserve_opacity=bool(content["preserve_opacity"]), keys=keys, loop=bool(content["loop"])
     )
     locked = content["locked"]

@@ -25,7 +25,7 @@ from cagefield.server.editor.edit_kinds import Kind, with_kind, with_options, wi
 from cagefield.server.editor.edit_texts import ReadEdits, edits_in
 from cagefield.server.editor.history import History
 from cagefield.server.editor.identity_cache import IdentityCache
-from cagefield.server.editor.labels import edit_label, fresh_name, of, option_word
+from cagefield.server.editor.labels import edit_label, fresh_name, option_word, suffix_for
 from cagefield.server.editor.mirror import mirror_edit
 from cagefield.server.editor.pasting import crop_paste
 from cagefield.server.editor.path_edits import edits_at_time
@@ -197,7 +197,7 @@ class Session:
             edit = with_outer(edit, cage)
         else:
             edit = crop_paste(edit, cage) if isinstance(edit, Paste) else edit.replace(inner=cage)
-        self._put(f"Set {which} cage{of(entry)}", replace(entry, edit=edit))
+        self._put(f"Set {which} cage{suffix_for(entry)}", replace(entry, edit=edit))
 
     def place(self, point: Array, view_height: float) -> int:
         """The number of a new continuous edit, selected, its cages around a point [3] of a surface."""
@@ -215,13 +215,13 @@ class Session:
         entry = self._unlocked(number)
         if isinstance(entry.edit, Paste):
             inner = Cage(inner.corners, pivot=entry.edit.inner.pivot)
-        self._put(f"Fit inner cage{of(entry)}", replace(entry, edit=entry.edit.replace(inner=inner)))
+        self._put(f"Fit inner cage{suffix_for(entry)}", replace(entry, edit=entry.edit.replace(inner=inner)))
 
     def outer_margin(self, number: int, margin: float) -> None:
         """The outer cage as a margin around all that the inner cage is and was."""
         entry = self._unlocked(number)
         outer = outer_cage_around(entry.edit, margin)
-        self._put(f"Outer margin{of(entry)}", replace(entry, edit=with_outer(entry.edit, outer)))
+        self._put(f"Outer margin{suffix_for(entry)}", replace(entry, edit=with_outer(entry.edit, outer)))
 
     # ---- options and the list ----
 
@@ -252,7 +252,7 @@ class Session:
             words.append("show" if options["enabled"] else "hide")
         words += [option_word(name) for name in options if name != "enabled"]
         if entry != before:
-            self._put(f"{', '.join(words).capitalize()}{of(before)}", entry)
+            self._put(f"{', '.join(words).capitalize()}{suffix_for(before)}", entry)
 
     def preserve_opacity(self, value: bool) -> None:
         """Whether density is scaled with the map, for all edits."""
@@ -270,7 +270,7 @@ class Session:
         """The number of a copy of an edit, after it."""
         entry = self.document.entry(number)
         edit = entry.edit.replace(name=fresh_name(self.document, entry.edit.name or "edit"))
-        return self._add(f"Duplicate{of(entry)}", edit, at=self.document.place(number) + 1)
+        return self._add(f"Duplicate{suffix_for(entry)}", edit, at=self.document.place(number) + 1)
 
     def mirror(self, number: int, axis: int) -> int:
         """The number of a mirrored copy of an edit, across the plane through the field's middle."""
@@ -279,14 +279,14 @@ class Session:
             raise EditError(f'edit "{entry.edit.name}" is pasted; what is pasted cannot be mirrored')
         edit = mirror_edit(entry.edit, axis, float(self.bounds[:, axis].mean()))
         edit = edit.replace(name=fresh_name(self.document, entry.edit.name or "edit"))
-        return self._add(f"Mirror{of(entry)}", edit, at=self.document.place(number) + 1)
+        return self._add(f"Mirror{suffix_for(entry)}", edit, at=self.document.place(number) + 1)
 
     def remove(self, number: int) -> None:
         """An edit goes; the one beside it is selected."""
         entry = self._unlocked(number)
         at = self.document.place(number)
         document = self.document.without(number)
-        self._push(f"Remove{of(entry)}", document)
+        self._push(f"Remove{suffix_for(entry)}", document)
         rest = document.entries
         self.selected = rest[min(at, len(rest) - 1)].id if rest else None
 
@@ -295,20 +295,20 @@ class Session:
         entry = self.document.entry(number)
         document = self.document.moved(number, to)
         if document != self.document:
-            self._push(f"Reorder{of(entry)}", document)
+            self._push(f"Reorder{suffix_for(entry)}", document)
 
     def reset_operations(self, number: int) -> None:
         """The inner cage goes back to where it was set."""
         entry = self._unlocked(number)
         if entry.edit.operations:
-            self._put(f"Reset{of(entry)}", replace(entry, edit=entry.edit.replace(operations=())))
+            self._put(f"Reset{suffix_for(entry)}", replace(entry, edit=entry.edit.replace(operations=())))
 
     def remove_last_operation(self, number: int) -> None:
         """The last operation of an edit goes."""
         entry = self._unlocked(number)
         if entry.edit.operations:
             edit = entry.edit.replace(operations=entry.edit.operations[:-1])
-            self._put(f"Remove last operation{of(entry)}", replace(entry, edit=edit))
+            self._put(f"Remove last operation{suffix_for(entry)}", replace(entry, edit=edit))
 
     # ---- texts, path, history ----
 

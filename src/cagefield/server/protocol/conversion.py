@@ -35,7 +35,7 @@ def operation_of(message: operation_messages.OperationMessage) -> Operation:
     if isinstance(message, operation_messages.RotateBy):
         return ops.Rotate(message.rotation_deg, message.axes)
     if isinstance(message, operation_messages.ScaleBy):
-        return ops.Scale.of(message.by, message.axes)
+        return ops.Scale.from_factors(message.by, message.axes)
     if isinstance(message, operation_messages.ShearBy):
         return ops.Shear(
             message.xy, message.xz, message.yx, message.yz, message.zx, message.zy, axes=message.axes

@@ -152,7 +152,7 @@ class NerfRun:
             some = pixel_indices[within] if middle and within.any() else pixel_indices
             i, j = some[rng.integers(0, len(some), count)].T
         target = self.photos[number][torch.from_numpy(j).to(self.device), torch.from_numpy(i).to(self.device)]
-        return Rays.of(camera, self.device, np.stack([i, j], axis=1)), target
+        return Rays.from_camera(camera, self.device, np.stack([i, j], axis=1)), target
 
     def progress(self) -> NerfProgress:
         """Progress report of the run."""

@@ -90,7 +90,7 @@ def evaluate_nerf(field: NerfField, views: tuple[View, ...], pixels: int = 2500)
             indices = indices[valid[indices[:, 1], indices[:, 0]]]
         if not len(indices):
             continue
-        rgb, opacity, _ = trace(field.torch, Rays.of(camera, field.torch.device, indices))
+        rgb, opacity, _ = trace(field.torch, Rays.from_camera(camera, field.torch.device, indices))
         background = 1.0 if view.load().shape[2] == 4 else 0.0
         image = rgb.cpu().numpy() + background * (1.0 - opacity.cpu().numpy()[:, None])
         error = np.mean((np.clip(image, 0, 1) - photo[indices[:, 1], indices[:, 0]]) ** 2)
