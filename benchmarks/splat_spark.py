@@ -228,10 +228,10 @@ def by_oracle(renderer: SplatRenderer, camera: Camera) -> str:
     """The lower PSNR, on white and on black, of our picture against the oracle's."""
     near, limits = near_depth(renderer.field.bounds), intrinsics(camera).limits
     seen = reference_rasterizer.project(renderer.splats, camera, near, limits)
-    colour, through, depth = reference_rasterizer.blend(seen, camera.width, camera.height)
+    color, through, depth = reference_rasterizer.blend(seen, camera.width, camera.height)
     figures = []
     for name in BACKGROUNDS:
-        exact = RenderResult.from_premultiplied(colour, 1.0 - through, depth, background=name)
+        exact = RenderResult.from_premultiplied(color, 1.0 - through, depth, background=name)
         frame = renderer.render(camera, background=name)
         assert frame is not None
         figures.append(psnr(frame.rgb, exact.rgb))

@@ -28,7 +28,7 @@ BOUNDS = np.array([[-2.5] * 3, [2.5] * 3])
 C0 = 0.28209479177387814
 
 
-def splats(means: np.ndarray, scales: tuple[float, float, float], colours: np.ndarray) -> SplatField:
+def splats(means: np.ndarray, scales: tuple[float, float, float], colors: np.ndarray) -> SplatField:
     """Splats of one shape, axes along x, y and z."""
     count = len(means)
     return SplatField(
@@ -36,7 +36,7 @@ def splats(means: np.ndarray, scales: tuple[float, float, float], colours: np.nd
         np.log(np.tile(scales, (count, 1))),
         np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
         np.full(count, 0.95),
-        ((colours - 0.5) / C0)[:, None],
+        ((colors - 0.5) / C0)[:, None],
         bounds=BOUNDS,
     )
 
@@ -44,8 +44,8 @@ def splats(means: np.ndarray, scales: tuple[float, float, float], colours: np.nd
 def rod() -> SplatField:
     """A thin part along z."""
     z = np.linspace(-1.0, 1.0, 9)
-    colours = np.stack([0.5 + 0.5 * np.sin(6 * z), np.full(9, 0.3), 0.5 - 0.5 * np.sin(6 * z)], axis=1)
-    return splats(np.stack([0 * z, 0 * z, z], axis=1), (0.03, 0.03, 0.15), colours)
+    colors = np.stack([0.5 + 0.5 * np.sin(6 * z), np.full(9, 0.3), 0.5 - 0.5 * np.sin(6 * z)], axis=1)
+    return splats(np.stack([0 * z, 0 * z, z], axis=1), (0.03, 0.03, 0.15), colors)
 
 
 def leaning_rod() -> SplatField:
@@ -59,8 +59,8 @@ def leaning_rod() -> SplatField:
 def sheet() -> SplatField:
     """A flat part across y."""
     z, x = (grid.ravel() for grid in np.meshgrid(np.linspace(-1, 1, 10), np.linspace(-0.35, 0.35, 4)))
-    colours = np.stack([0.5 + 0.5 * np.sin(9 * z), 0.5 + 0.5 * np.sin(9 * x), np.full(40, 0.4)], axis=1)
-    return splats(np.stack([x, 0 * x, z], axis=1), (0.11, 0.01, 0.105), colours)
+    colors = np.stack([0.5 + 0.5 * np.sin(9 * z), 0.5 + 0.5 * np.sin(9 * x), np.full(40, 0.4)], axis=1)
+    return splats(np.stack([x, 0 * x, z], axis=1), (0.11, 0.01, 0.105), colors)
 
 
 def ball() -> SplatField:
@@ -74,8 +74,8 @@ def ball() -> SplatField:
     half = normals + np.array([0.0, 0.0, 1.0])
     half /= np.linalg.norm(half, axis=1, keepdims=True)
     quaternions = np.stack([half[:, 2], -half[:, 1], half[:, 0], 0 * z], axis=1)
-    colours = np.stack([0.5 + 0.5 * np.sin(9 * z), 0.5 + 0.5 * normals[:, 0], np.full(count, 0.4)], axis=1)
-    flat = splats(0.7 * normals, (0.09, 0.09, 0.01), colours)
+    colors = np.stack([0.5 + 0.5 * np.sin(9 * z), 0.5 + 0.5 * normals[:, 0], np.full(count, 0.4)], axis=1)
+    flat = splats(0.7 * normals, (0.09, 0.09, 0.01), colors)
     return dataclasses.replace(flat, quaternions=quaternions.astype(np.float32))
 
 

@@ -34,12 +34,12 @@ def volume_picture(
     """The picture [H,W,3] over white of a field of degree 0, of cubes and depth layers of these sizes."""
     forward = np.asarray(camera.forward, np.float64)
     shape = (camera.height, camera.width)
-    centre = (np.asarray(field.bounds).mean(axis=0) - camera.origin) @ forward
-    first, layers = centre - 1.6, round(3.2 / layer)
+    center = (np.asarray(field.bounds).mean(axis=0) - camera.origin) @ forward
+    first, layers = center - 1.6, round(3.2 / layer)
     counted = np.zeros((layers, *shape, 4), np.float32)
     turns = rotation_matrices(field.quaternions.astype(np.float64))
     scales = np.exp(field.log_scales.astype(np.float64))
-    colours = np.clip(field.sh[:, 0].astype(np.float64) * C0 + 0.5, 0.0, 1.0)
+    colors = np.clip(field.sh[:, 0].astype(np.float64) * C0 + 0.5, 0.0, 1.0)
     radii = np.linspace(0.0, REACH * 1.01, 4000)
     origin = np.asarray(camera.origin, np.float64)
     rotation = np.asarray(camera.c2w, np.float64)[:3, :3]
@@ -62,7 +62,7 @@ def volume_picture(
             mapped = to_deformed(edit.exact_warp, points)
             points, jacobian = mapped.points, mapped.jacobian
         _count(
-            z, points, jacobian @ A, edges, rho, radii[1], colours[n], origin, forward,
+            z, points, jacobian @ A, edges, rho, radii[1], colors[n], origin, forward,
             np.ascontiguousarray(rotation[:, 0]), np.ascontiguousarray(rotation[:, 1]),
             pixels[0], across, down, first, layer, counted, n,
         )  # fmt: skip
@@ -77,7 +77,7 @@ def volume_picture(
 
 @numba.njit(cache=True)
 def _count(
-    z, points, M, edges, rho, step, colour, origin, forward, right, up, middle, across, down, first, layer,
+    z, points, M, edges, rho, step, color, origin, forward, right, up, middle, across, down, first, layer,
     counted, seed,
 ):  # fmt: skip
     np.random.seed(seed)
@@ -113,4 +113,4 @@ def _count(
             tau = density * volume * area * pixel / (depth * depth)
             counted[bin, py, px, 3] += tau
             for c in range(3):
-                counted[bin, py, px, c] += tau * colour[c]
+                counted[bin, py, px, c] += tau * color[c]

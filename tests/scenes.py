@@ -32,13 +32,13 @@ def ball_field(density: float = 40.0, resolution: int = 17, radius: float = 0.5)
     axis = np.linspace(-1.0, 1.0, resolution)
     grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     vertices = np.flatnonzero(np.linalg.norm(grid, axis=1) <= radius)
-    colour = (np.array([0.9, 0.2, 0.1]) - 0.5) / SH_C0
+    color = (np.array([0.9, 0.2, 0.1]) - 0.5) / SH_C0
     return VoxelField(
         bounds=np.array([[-1.0] * 3, [1.0] * 3]),
         resolution=(resolution,) * 3,
         vertices=vertices,
         density=np.full(len(vertices), density, np.float32),
-        sh=np.broadcast_to(colour.astype(np.float32), (len(vertices), 1, 3)),
+        sh=np.broadcast_to(color.astype(np.float32), (len(vertices), 1, 3)),
     )
 
 

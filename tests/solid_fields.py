@@ -17,13 +17,13 @@ def solid_field(solid: NDArray[np.bool_], rgb: NDArray[np.floating], scale: floa
     """
     away, nearest = ndimage.distance_transform_edt(~solid, return_indices=True)
     vertices = np.flatnonzero(away < 2.0)
-    colours = rgb[tuple(nearest)].reshape(-1, 3)[vertices]
+    colors = rgb[tuple(nearest)].reshape(-1, 3)[vertices]
     return VoxelField(
         np.array([[-scale] * 3, [scale] * 3]),
         solid.shape,
         vertices,
         np.where(solid.reshape(-1)[vertices], (len(solid) - 1) / scale, 0.0).astype(np.float32),
-        ((colours - 0.5) / C0).astype(np.float32)[:, None],
+        ((colors - 0.5) / C0).astype(np.float32)[:, None],
     )
 
 

@@ -22,13 +22,13 @@ BOX = np.array([[-1.0] * 3, [1.0] * 3])
 def painted_ball(count: int = 250) -> SplatField:
     """A ball of splats of random colours."""
     ball = ball_of_splats(count)
-    colours = np.random.default_rng(5).uniform(0.05, 0.95, (count, 1, 3))
+    colors = np.random.default_rng(5).uniform(0.05, 0.95, (count, 1, 3))
     return SplatField(
         ball.means,
         ball.log_scales,
         ball.quaternions,
         np.full(count, 0.95),
-        (colours - 0.5) / SH_C0,
+        (colors - 0.5) / SH_C0,
         bounds=BOX,
     )
 

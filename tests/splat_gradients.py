@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cagefield.cameras.camera import Camera
 from cagefield.rendering.splats import reference_rasterizer as reference
 from cagefield.rendering.splats.rasterizer import (
-    COLOUR,
+    COLOR,
     intrinsics,
     kernels,
     project,
@@ -34,13 +34,13 @@ def analytic(
     """Gradients [N,GRADIENT_FLOATS], curvatures [N,CURVATURE_FLOATS], and the splats drawn."""
     splats = single(splats_of(values, antialiased))
     seen = project(splats, view, near=NEAR)
-    tiles, stops = seen.blend(COLOUR)
-    colour = np.ascontiguousarray(tiles[:, 1:4] + tiles[:, :1] * background[:, None].astype(np.float32))
-    slopes = colour - tiled(target.astype(np.float32))
+    tiles, stops = seen.blend(COLOR)
+    color = np.ascontiguousarray(tiles[:, 1:4] + tiles[:, :1] * background[:, None].astype(np.float32))
+    slopes = color - tiled(target.astype(np.float32))
     lens = intrinsics(view)
     gradients = np.zeros((len(splats), GRADIENT_FLOATS), np.float32)
     curvatures = np.zeros((len(splats), CURVATURE_FLOATS), np.float32)
-    sums = seen.gradients(colour, slopes, stops)
+    sums = seen.gradients(color, slopes, stops)
     with kernels():
         backpropagate(
             seen.order,
@@ -73,8 +73,8 @@ def pictures(view: Camera, background: NDArray, antialiased: bool) -> Callable[[
 
     def picture(values: Values) -> NDArray:
         seen = reference.project(splats_of(values, antialiased), view, NEAR, limits)
-        colour, through, _ = reference.blend(seen, view.width, view.height)
-        return colour + through[..., None] * background
+        color, through, _ = reference.blend(seen, view.width, view.height)
+        return color + through[..., None] * background
 
     return picture
 

@@ -32,13 +32,13 @@ def room(box: bool, scale: float = 1.0, by: tuple[float, float] = (0.0, 0.0)) ->
     axis = np.arange(-1.0, 1.0 + 0.5 * STEP, STEP)
     x, y = (part.reshape(-1) for part in np.meshgrid(axis, axis, indexing="ij"))
     floor = np.stack([x, y, np.zeros_like(x)], axis=1)
-    colour = np.stack([0.45 + 0.2 * x, 0.55 + 0.15 * y, 0.5 - 0.1 * x], axis=1)
-    points, rgb, normals = [floor], [colour], [np.tile([0.0, 0.0, 1.0], (len(x), 1))]
+    color = np.stack([0.45 + 0.2 * x, 0.55 + 0.15 * y, 0.5 - 0.1 * x], axis=1)
+    points, rgb, normals = [floor], [color], [np.tile([0.0, 0.0, 1.0], (len(x), 1))]
     if box:
         low, high = BOX.aabb + np.array([*by, 0.0])
         away = np.linalg.norm(np.maximum(np.maximum(low - floor, floor - high), 0.0), axis=1)
-        colour *= 1.0 - STRENGTH * np.clip(1.0 - away / REACH, 0.0, 1.0)[:, None]
-        colour[away == 0.0] = 0.0
+        color *= 1.0 - STRENGTH * np.clip(1.0 - away / REACH, 0.0, 1.0)[:, None]
+        color[away == 0.0] = 0.0
         along = np.arange(-0.225, 0.25, STEP)
         for axis_number in range(3):
             for side in (-1.0, 1.0):

@@ -32,13 +32,13 @@ def ball_of_splats(count: int = 600, radius: float = 0.5, seed: int = 0) -> Spla
     quaternions = np.stack([1.0 + normals[:, 2], -normals[:, 1], normals[:, 0], np.zeros(count)], axis=1)
     size = 2.5 * radius / np.sqrt(count)
     scales = np.broadcast_to((size, size, 0.2 * size), (count, 3))
-    colour = (np.array([0.9, 0.2, 0.1]) - 0.5) / SH_C0
+    color = (np.array([0.9, 0.2, 0.1]) - 0.5) / SH_C0
     return SplatField(
         radius * normals,
         np.log(scales),
         quaternions + np.array([1e-6, 0.0, 0.0, 0.0]),
         np.full(count, 0.8),
-        np.broadcast_to(colour, (count, 1, 3)),
+        np.broadcast_to(color, (count, 1, 3)),
         bounds=np.array([[-1.0] * 3, [1.0] * 3]),
     )
 

@@ -22,8 +22,8 @@ LENSES = {
 def camera(lens: str = "pinhole", width: int = 75, height: int = 50) -> Camera:
     """A camera 4 units from the origin with the centre of its lens off that of its picture."""
     plain = Camera.look_at((2.5, -3.0, 1.0), (0, 0, 0), width=width, height=height, fov_x=0.9)
-    centre = (0.42 * width, 0.56 * height)
-    return replace(plain, fy=1.1 * plain.fy, cx=centre[0], cy=centre[1], model=lens, distortion=LENSES[lens])
+    center = (0.42 * width, 0.56 * height)
+    return replace(plain, fy=1.1 * plain.fy, cx=center[0], cy=center[1], model=lens, distortion=LENSES[lens])
 
 
 def covariances(quaternions: NDArray, log_scales: NDArray) -> NDArray:

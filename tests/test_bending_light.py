@@ -191,8 +191,8 @@ def test_the_floor_goes_on_under_splats_that_are_lifted():
             np.maximum(np.abs(light.patch.points[:, :2] - [0.1, 0.0]) - 0.25, 0.0), axis=1
         )
         assert (beside == 0.0).sum() > 0.5 * under.sum() and np.abs(light.patch.points[:, 2]).max() < 0.04
-        colours = 0.5 + C0 * field.sh[light.patch.sources, 0] * light.patch.gains
-        assert colours.mean() > 0.35
+        colors = 0.5 + C0 * field.sh[light.patch.sources, 0] * light.patch.gains
+        assert colors.mean() > 0.35
 
 
 def test_splats_under_what_is_lifted_get_lighter():

@@ -54,10 +54,10 @@ def test_single_view_with_size_background_depth_and_normals(scene: Path, tmp_pat
     np.testing.assert_array_equal(read_image(tmp_path / "one.png"), frame.rgb8())
     depth = np.load(tmp_path / "one_depth.npy")
     np.testing.assert_array_equal(depth, frame.depth)
-    grey = read_image(tmp_path / "one_depth.png")[..., 0].astype(int)
+    gray = read_image(tmp_path / "one_depth.png")[..., 0].astype(int)
     seen = frame.opacity > 0.9
     nearest, farthest = depth[seen].argmin(), depth[seen].argmax()
-    assert grey[seen][nearest] > grey[seen][farthest] and grey[0, 0] == 0
+    assert gray[seen][nearest] > gray[seen][farthest] and gray[0, 0] == 0
     assert frame.normals is not None
     normals = read_image(tmp_path / "one_normals.png") / 255.0 * 2.0 - 1.0
     np.testing.assert_allclose(normals[seen], frame.normals[seen], atol=1.01 / 255)

@@ -266,13 +266,13 @@ def test_random_points_are_seen_and_have_the_photos_colours(data):
     inside = np.all((found.positions >= data.bounds[0]) & (found.positions <= data.bounds[1]), axis=1)
     assert inside.sum() == 200
     for point, rgb in list(zip(found.positions, found.rgb, strict=True))[::40]:
-        colours = []
+        colors = []
         for view in data.train:
             (at,), (depth,) = view.camera.project(point[None])
             if depth > 0 and 0 <= at[0] < view.camera.width and 0 <= at[1] < view.camera.height:
-                colours.append(view.load()[int(at[1]), int(at[0])])
-        assert len(colours) >= 2
-        np.testing.assert_allclose(rgb, np.mean(colours, axis=0), atol=1)
+                colors.append(view.load()[int(at[1]), int(at[0])])
+        assert len(colors) >= 2
+        np.testing.assert_allclose(rgb, np.mean(colors, axis=0), atol=1)
     again, other = random_points(data, 400, seed=3), random_points(data, 400, seed=4)
     np.testing.assert_array_equal(found.positions, again.positions)
     assert not np.array_equal(found.positions, other.positions)

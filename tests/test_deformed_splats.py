@@ -405,7 +405,7 @@ def test_what_is_kept_of_a_field_ends_with_it():
 
 
 def test_proceed_gives_the_work_up(monkeypatch):
-    monkeypatch.setattr(forward, "CHUNK", 100)
+    monkeypatch.setattr(forward, "POINTS_PER_STEP", 100)
     field, calls = random_splats(1000), []
 
     class EnoughError(Exception):
@@ -421,7 +421,7 @@ def test_proceed_gives_the_work_up(monkeypatch):
     assert len(calls) == 3
     # Parts or one piece, the map is the same.
     parts = deformed_splats(field, EditStack(EDITS["rotate"]))
-    monkeypatch.setattr(forward, "CHUNK", 10**6)
+    monkeypatch.setattr(forward, "POINTS_PER_STEP", 10**6)
     whole = deformed_splats(field.take(np.arange(1000)), EditStack(EDITS["rotate"]))
     assert np.array_equal(parts.means, whole.means)
 

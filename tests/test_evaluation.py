@@ -67,8 +67,8 @@ def test_views_are_compared_without_excluded_pixels_over_their_own_background(tm
 
     def render(camera: Camera, background: str) -> Any:
         asked.append(background)
-        grey = 0.5 if background == "black" else 0.75
-        return SimpleNamespace(rgb=np.full((camera.height, camera.width, 3), grey, np.float32))
+        gray = 0.5 if background == "black" else 0.75
+        return SimpleNamespace(rgb=np.full((camera.height, camera.width, 3), gray, np.float32))
 
     monkeypatch.setattr(
         "cagefield.rendering.renderers.renderer_of", lambda field: SimpleNamespace(render=render)

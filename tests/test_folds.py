@@ -36,8 +36,8 @@ def photo(camera: Camera) -> np.ndarray:
     hit = origins + np.where(np.isfinite(ball), ball, 0.0)[:, None] * directions
     turned = np.stack([hit[:, 0] ** 2 - hit[:, 1] ** 2, hit[:, 0] * hit[:, 1], hit[:, 2]], axis=1)
     value = 0.5 + 0.15 * np.where(np.isfinite(ball), noise(turned, 0.1), noise(points, 1.0))
-    grey = np.rint(255 * np.clip(value, 0, 1)).astype(np.uint8).reshape(HEIGHT, WIDTH, 1)
-    return np.repeat(grey, 3, axis=2)
+    gray = np.rint(255 * np.clip(value, 0, 1)).astype(np.uint8).reshape(HEIGHT, WIDTH, 1)
+    return np.repeat(gray, 3, axis=2)
 
 
 def dataset(folder, poses: list[Camera], photos: list[np.ndarray]) -> Dataset:

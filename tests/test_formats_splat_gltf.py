@@ -47,7 +47,7 @@ def in_space(path: Path, space: str | None) -> Path:
     return changed(path, change)
 
 
-def colours(sh: np.ndarray, directions: np.ndarray) -> np.ndarray:
+def colors(sh: np.ndarray, directions: np.ndarray) -> np.ndarray:
     """Colours [N,D,3] along directions [D,3]."""
     degree = int(np.sqrt(sh.shape[1])) - 1
     return 0.5 + np.einsum("dk,nkc->ndc", sh_basis(directions, degree), np.asarray(sh, np.float64))
@@ -90,18 +90,18 @@ def test_harmonics_of_linear_light_become_those_of_srgb(degree: int) -> None:
     errors = []
     for size in (0.02, 0.01, 0.005):
         small = np.concatenate([sh[:, :1], size * sh[:, 1:]], axis=1)
-        exact = encode_srgb(colours(small, directions()))
-        errors.append(np.abs(colours(convert_harmonics_to_srgb(small), directions()) - exact).max())
+        exact = encode_srgb(colors(small, directions()))
+        errors.append(np.abs(colors(convert_harmonics_to_srgb(small), directions()) - exact).max())
     assert errors[0] < 0.02
     assert 3.5 < errors[0] / errors[1] < 4.6 and 3.5 < errors[1] / errors[2] < 4.6
     # No other harmonics are nearer over all directions: small changes of any one add to the squared error.
     d = Rotation.random(4000, random_state=2).as_matrix()[:, 0]
-    exact = encode_srgb(colours(0.1 * sh, d))
+    exact = encode_srgb(colors(0.1 * sh, d))
     best = convert_harmonics_to_srgb(0.1 * sh)
-    least = np.square(colours(best, d) - exact).mean(axis=(1, 2))
+    least = np.square(colors(best, d) - exact).mean(axis=(1, 2))
     for _ in range(20):
         other = best + 0.05 * chance.normal(size=best.shape)
-        assert (np.square(colours(other, d) - exact).mean(axis=(1, 2)) > least).all()
+        assert (np.square(colors(other, d) - exact).mean(axis=(1, 2)) > least).all()
 
 
 def test_a_node_turns_splats_and_their_harmonics(tmp_path: Path) -> None:
@@ -117,8 +117,8 @@ def test_a_node_turns_splats_and_their_harmonics(tmp_path: Path) -> None:
         R @ rotation_matrices(field.quaternions.astype(float)),
         atol=1e-5,
     )
-    seen = colours(field.sh, directions())
-    np.testing.assert_allclose(colours(read.sh, directions() @ R.T), seen, atol=1e-5)
+    seen = colors(field.sh, directions())
+    np.testing.assert_allclose(colors(read.sh, directions() @ R.T), seen, atol=1e-5)
 
 
 @pytest.mark.parametrize(("normalised", "factor"), [(True, 1.0 / 255.0), (False, 1.0)])

@@ -28,12 +28,12 @@ def test_png_round_trip_is_exact(tmp_path, channels):
 
 
 def test_grey_palette_and_16_bit_files_become_rgb(tmp_path):
-    grey = gradient(4, 6, 1)[..., 0]
-    Image.fromarray(grey).save(tmp_path / "grey.png")
-    Image.fromarray(grey).convert("RGB").quantize(256).save(tmp_path / "palette.png")
-    Image.fromarray(grey.astype(np.uint16) * 257).save(tmp_path / "deep.png")
+    gray = gradient(4, 6, 1)[..., 0]
+    Image.fromarray(gray).save(tmp_path / "grey.png")
+    Image.fromarray(gray).convert("RGB").quantize(256).save(tmp_path / "palette.png")
+    Image.fromarray(gray.astype(np.uint16) * 257).save(tmp_path / "deep.png")
     for name in ("grey", "palette", "deep"):
-        np.testing.assert_array_equal(read_image(tmp_path / f"{name}.png"), np.repeat(grey[..., None], 3, -1))
+        np.testing.assert_array_equal(read_image(tmp_path / f"{name}.png"), np.repeat(gray[..., None], 3, -1))
 
 
 def test_16_bit_values_are_rounded(tmp_path):

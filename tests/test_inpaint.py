@@ -35,19 +35,19 @@ def grid() -> np.ndarray:
     return np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
 
 
-def field_of(density: np.ndarray, colour: np.ndarray, degree: int = 1) -> VoxelField:
+def field_of(density: np.ndarray, color: np.ndarray, degree: int = 1) -> VoxelField:
     """The field with density [N,N,N] and the same colour coefficients [N,N,N,3] in all directions."""
     vertices = np.flatnonzero(density.reshape(-1) > 0)
     sh = np.zeros((len(vertices), (degree + 1) ** 2, 3), np.float32)
-    sh[:, 0] = colour.reshape(-1, 3)[vertices]
+    sh[:, 0] = color.reshape(-1, 3)[vertices]
     return VoxelField(BOUNDS, density.shape, vertices, density.reshape(-1)[vertices], sh)
 
 
 def dense(field: VoxelField) -> tuple[np.ndarray, np.ndarray]:
     """(density [N,N,N], constant colour coefficients [N,N,N,3])."""
-    density, colour = np.zeros(N**3, np.float32), np.zeros((N**3, 3), np.float32)
-    density[field.vertices], colour[field.vertices] = field.density, field.sh[:, 0]
-    return density.reshape(N, N, N), colour.reshape(N, N, N, 3)
+    density, color = np.zeros(N**3, np.float32), np.zeros((N**3, 3), np.float32)
+    density[field.vertices], color[field.vertices] = field.density, field.sh[:, 0]
+    return density.reshape(N, N, N), color.reshape(N, N, N, 3)
 
 
 def ring(count: int = 12, height: float = 2.0) -> list[Camera]:
@@ -89,17 +89,17 @@ def ball() -> tuple[VoxelField, np.ndarray]:
     r = np.linalg.norm(p, axis=-1)
     density = np.where((r < 0.7) & (r > 0.55), 3.0 / VOXEL, 0.0).astype(np.float32)
     share = (p[..., :1] + 1) / 2
-    colour = share * np.array([1.0, 0.0, -1.0]) + (1 - share) * np.array([-1.0, 0.0, 1.0])
-    field = field_of(density, colour.astype(np.float32))
+    color = share * np.array([1.0, 0.0, -1.0]) + (1 - share) * np.array([-1.0, 0.0, 1.0])
+    field = field_of(density, color.astype(np.float32))
     return field, invisible_vertices(field, ring())
 
 
 def test_what_was_seen_stays_and_photos_show_the_same(ball) -> None:
     field, hidden = ball
     after = fill_unseen(field, hidden)
-    (before_density, before_colour), (density, colour) = dense(field), dense(after)
+    (before_density, before_colour), (density, color) = dense(field), dense(after)
     np.testing.assert_array_equal(density[~hidden], before_density[~hidden])
-    np.testing.assert_array_equal(colour[~hidden], before_colour[~hidden])
+    np.testing.assert_array_equal(color[~hidden], before_colour[~hidden])
     for camera in ring(3):
         one, two = (
             np.asarray(VoxelRenderer(f).render(camera, background="white").rgb) for f in (field, after)
@@ -127,16 +127,16 @@ def test_it_is_opaque_to_its_depth_and_no_deeper(ball) -> None:
 def test_colours_go_on_from_the_surfaces_and_stay_between_them(ball) -> None:
     field, hidden = ball
     after = fill_unseen(field, hidden)
-    density, colour = dense(after)
+    density, color = dense(after)
     new = hidden & (density > 0) & (np.linalg.norm(grid(), axis=-1) < 0.55)
     given = field.sh[:, 0]
-    assert (colour[new] >= given.min(axis=0) - 1e-3).all()
-    assert (colour[new] <= given.max(axis=0) + 1e-3).all()
+    assert (color[new] >= given.min(axis=0) - 1e-3).all()
+    assert (color[new] <= given.max(axis=0) + 1e-3).all()
     x = grid()[..., 0]
     right, left = new & (x > 0.3), new & (x < -0.3)
     # The shell there is (x + 1)/2 of the way from blue to red: above 0.25 right, under -0.25 left.
-    assert colour[right, 0].min() > 0.25
-    assert colour[left, 0].max() < -0.25
+    assert color[right, 0].min() > 0.25
+    assert color[left, 0].max() < -0.25
     at = np.searchsorted(after.vertices, np.flatnonzero(new))
     assert (after.sh[at, 1:] == 0).all()
 
@@ -146,11 +146,11 @@ def test_under_a_block_the_ground_goes_on() -> None:
     ground = p[..., 2] <= -0.5
     block = (np.abs(p[..., :2]).max(axis=-1) <= 0.3) & (p[..., 2] > -0.5) & (p[..., 2] <= 0.3)
     density = np.where(ground | block, 3.0 / VOXEL, 0.0).astype(np.float32)
-    colour = np.where(ground[..., None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]).astype(np.float32)
-    hidden = invisible_vertices(field_of(density, colour), ring())
+    color = np.where(ground[..., None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]).astype(np.float32)
+    hidden = invisible_vertices(field_of(density, color), ring())
     # What a training leaves where no photo looks.
-    colour[hidden] = [-1.0, -1.0, 2.0]
-    field = field_of(density, colour)
+    color[hidden] = [-1.0, -1.0, 2.0]
+    field = field_of(density, color)
     _, after = dense(fill_unseen(field, hidden))
     k = int(np.argmin(np.abs(np.linspace(-1, 1, N) + 0.5))) - 1
     under = hidden[:, :, k] & (np.abs(p[:, :, k, :2]).max(axis=-1) < 0.25)
@@ -176,12 +176,12 @@ def test_colours_stay_between_the_surfaces_where_the_solver_runs_out_of_steps(
     np.testing.assert_array_equal(short.vertices, whole.vertices)
     np.testing.assert_array_equal(short.density, whole.density)
     at = np.searchsorted(whole.vertices, np.flatnonzero(hidden & (dense(whole)[0] > 0)))
-    colour, given = short.sh[at, 0], field.sh[:, 0]
-    assert (colour >= given.min(axis=0) - 1e-6).all() and (colour <= given.max(axis=0) + 1e-6).all()
-    assert not np.array_equal(colour, whole.sh[at, 0])
+    color, given = short.sh[at, 0], field.sh[:, 0]
+    assert (color >= given.min(axis=0) - 1e-6).all() and (color <= given.max(axis=0) + 1e-6).all()
+    assert not np.array_equal(color, whole.sh[at, 0])
     # It is the surfaces' colours, not grey: as they run, red comes with x and blue goes.
     x = grid().reshape(-1, 3)[whole.vertices[at], 0]
-    assert colour[x > 0.3, 0].min() > 0.25 and colour[x < -0.3, 0].max() < -0.25
+    assert color[x > 0.3, 0].min() > 0.25 and color[x < -0.3, 0].max() < -0.25
 
 
 def block(n: int = 16) -> tuple[sparse.csr_matrix, np.ndarray]:
@@ -217,11 +217,11 @@ def test_a_solution_cut_short_mixes_its_sources_and_nothing_else(monkeypatch: py
     source = np.zeros((len(diagonal), 2))
     source[0], source[-1] = (1.0, 1.0), (1.0, 0.0)  # weights, and weights times colours 1 and 0
     monkeypatch.setattr(inpainting, "MAX_SOLVER_STEPS", 40)
-    weight, colour = inpainting.solve_diffusion(pull, diagonal, source).T
+    weight, color = inpainting.solve_diffusion(pull, diagonal, source).T
     # The corners are 45 voxels apart; 40 steps of conjugate gradients stop short with a colour of 1.00005.
     assert (weight > 0).all()
-    assert (colour >= 0).all() and (colour <= weight).all()
-    assert colour[0] > 0.99 * weight[0] and colour[-1] < 0.01 * weight[-1]
+    assert (color >= 0).all() and (color <= weight).all()
+    assert color[0] > 0.99 * weight[0] and color[-1] < 0.01 * weight[-1]
 
 
 def test_nothing_unseen_and_nothing_solid_leave_the_field_as_it_is(ball) -> None:

@@ -115,9 +115,9 @@ def test_another_program_reads_the_glb_with_y_up(mesh: Mesh, tmp_path: Path, up:
     document = json.loads(content[20 : 20 + length])
     view = document["bufferViews"][document["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"]]
     start = 28 + length + view["byteOffset"]
-    colours = np.frombuffer(content[start : start + view["byteLength"]], "<u2").reshape(-1, 4) / 65535.0
-    np.testing.assert_allclose(colours[:, :3], srgb_to_linear(mesh.rgb), atol=0.5 / 65535 + 1e-6)
-    assert (colours[:, 3] == 1.0).all() and len(content) % 4 == 0
+    colors = np.frombuffer(content[start : start + view["byteLength"]], "<u2").reshape(-1, 4) / 65535.0
+    np.testing.assert_allclose(colors[:, :3], srgb_to_linear(mesh.rgb), atol=0.5 / 65535 + 1e-6)
+    assert (colors[:, 3] == 1.0).all() and len(content) % 4 == 0
 
 
 def test_linear_light_is_srgbs() -> None:

@@ -121,10 +121,10 @@ def test_a_bounded_field_is_empty_outside_its_bounds_and_the_same_within() -> No
     inside = (np.abs(p) <= 1.5).all(axis=1)
     sigma, rgb = whole(p, d)
     assert sigma[~inside].max() > 1.0
-    found, colour = bounded(p, d)
+    found, color = bounded(p, d)
     # the same positions, in other blocks
     np.testing.assert_allclose(found, np.where(inside, sigma, 0.0), atol=1e-4)
-    np.testing.assert_allclose(colour[inside], rgb[inside], atol=1e-5)
+    np.testing.assert_allclose(color[inside], rgb[inside], atol=1e-5)
     np.testing.assert_allclose(
         bounded.seen_along(p, np.stack([d, -d], axis=1))[0], np.where(inside, sigma, 0.0), atol=1e-4
     )

@@ -58,12 +58,12 @@ class Together:
 
     def __call__(self, p: NDArray[np.float32], d: NDArray[np.float32]) -> tuple[NDArray[np.float32], ...]:
         R = Rotation.from_euler("XYZ", TURN, degrees=True).as_matrix()
-        own, colour = PLACE(p, d)
+        own, color = PLACE(p, d)
         there = ((p.astype(np.float64) - self.by) @ R / self.scale).astype(np.float32)
         sigma, rgb = THING(there, (d.astype(np.float64) @ R).astype(np.float32))
         sigma = sigma / self.scale if self.kept else sigma
         total = np.maximum(own + sigma, 1e-9)
-        mixed = (own / total)[:, None] * colour + (sigma / total)[:, None] * rgb
+        mixed = (own / total)[:, None] * color + (sigma / total)[:, None] * rgb
         return own + sigma, mixed.astype(np.float32)
 
 

@@ -125,5 +125,5 @@ def test_what_a_lifted_part_hid_takes_the_colours_around() -> None:
     block = extract_block(field, EditStack([light]), field.bounds)
     points = block.positions(np.ones(block.shape, bool)).reshape(*block.shape, 3)
     deep = (np.abs(points[..., :2] - [0.1, 0.0]) < 0.12).all(axis=-1) & (np.abs(points[..., 2] + 0.42) < 0.02)
-    colours = block.mean_colors(deep & (block.slot >= 0))
-    assert len(colours) > 20 and colours.std() < 0.05
+    colors = block.mean_colors(deep & (block.slot >= 0))
+    assert len(colors) > 20 and colors.std() < 0.05

@@ -33,31 +33,29 @@ def tiles() -> Array:
     return np.asarray(0.5 + 0.4 * np.stack([wave, wave, -wave], axis=-1))
 
 
-def spanned(colours: Array, gap: Mask) -> Array:
-    return solve_membrane(gap, ~gap, colours.reshape(-1, 3)).reshape(colours.shape)
+def spanned(colors: Array, gap: Mask) -> Array:
+    return solve_membrane(gap, ~gap, colors.reshape(-1, 3)).reshape(colors.shape)
 
 
-def filled(colours: Array, gap: Mask) -> tuple[Array, Array]:
+def filled(colors: Array, gap: Mask) -> tuple[Array, Array]:
     """(the membrane, the same with the pattern)."""
-    hidden = np.where(gap[..., None], 9.0, colours)
+    hidden = np.where(gap[..., None], 9.0, colors)
     start = spanned(hidden, gap)
     return start, inpaint_texture(gap, ~gap, hidden, start, np.zeros(gap.shape))
 
 
 def test_what_repeats_goes_on_as_it_is() -> None:
-    colours, gap = tiles(), hole()
-    start, found = filled(colours, gap)
-    wrong, left = (np.abs(each - colours)[gap].mean() for each in (found, start))
+    colors, gap = tiles(), hole()
+    start, found = filled(colors, gap)
+    wrong, left = (np.abs(each - colors)[gap].mean() for each in (found, start))
     assert wrong < 0.2 * left
 
 
 def test_a_large_hole_goes_by_patches_farther_apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    colours, gap = tiles(), hole()
-    start, found = filled(colours, gap)
+    colors, gap = tiles(), hole()
+    start, found = filled(colors, gap)
     monkeypatch.setattr(exemplar_inpainting, "MAX_DENSE_PATCHES", 100)
-    wrong, less, left = (
-        np.abs(each - colours)[gap].mean() for each in (found, filled(colours, gap)[1], start)
-    )
+    wrong, less, left = (np.abs(each - colors)[gap].mean() for each in (found, filled(colors, gap)[1], start))
     assert not np.array_equal(wrong, less) and less < 0.3 * left
 
 
@@ -66,51 +64,49 @@ def test_spots_go_on() -> None:
     gap, inner = hole(), hole(9.0)
     strength = []
     for seed in range(4):
-        colours = spots(seed)
-        start, found = filled(colours, gap)
-        strength.append([each[inner, 0].std() / colours[~gap, 0].std() for each in (start, found)])
-        assert found[gap].min() >= colours.min() - 1e-9 and found[gap].max() <= colours.max() + 1e-9
-        whole = np.where(gap[..., None], found, colours)
+        colors = spots(seed)
+        start, found = filled(colors, gap)
+        strength.append([each[inner, 0].std() / colors[~gap, 0].std() for each in (start, found)])
+        assert found[gap].min() >= colors.min() - 1e-9 and found[gap].max() <= colors.max() + 1e-9
+        whole = np.where(gap[..., None], found, colors)
         rim = np.abs(np.diff(whole, axis=0))[gap[1:] != gap[:-1]]
-        assert rim.mean() < 2.0 * np.abs(np.diff(colours, axis=0)).mean()
+        assert rim.mean() < 2.0 * np.abs(np.diff(colors, axis=0)).mean()
     left, now = np.mean(strength, axis=0)
     assert now > 0.55 and now > 2.0 * left
 
 
 def test_one_colour_stays_one() -> None:
-    colours, gap = np.full((SIZE, SIZE, 3), 0.25), hole()
-    np.testing.assert_allclose(filled(colours, gap)[1][gap], 0.25, atol=1e-9)
+    colors, gap = np.full((SIZE, SIZE, 3), 0.25), hole()
+    np.testing.assert_allclose(filled(colors, gap)[1][gap], 0.25, atol=1e-9)
 
 
 def test_a_pattern_that_does_not_fit_is_left_out() -> None:
     """Beside a rim of a colour that is nowhere else spots would show where the hole was."""
-    colours, gap = spots(), hole()
-    colours[hole(15.5) & ~gap] = (0.2, 0.4, 3.0)
-    start, found = filled(colours, gap)
+    colors, gap = spots(), hole()
+    colors[hole(15.5) & ~gap] = (0.2, 0.4, 3.0)
+    start, found = filled(colors, gap)
     assert np.abs(found - start)[gap].mean() < 0.02
 
 
 def test_where_little_is_known_all_stays_as_it_begins() -> None:
-    colours, gap = spots(), ~hole(5.0)
-    start, found = filled(colours, gap)
+    colors, gap = spots(), ~hole(5.0)
+    start, found = filled(colors, gap)
     np.testing.assert_array_equal(found[gap], start[gap])
     nothing = np.zeros((SIZE, SIZE), bool)
+    np.testing.assert_array_equal(inpaint_texture(nothing, ~nothing, colors, colors, nothing * 1.0), colors)
+    start = spanned(colors[:5, :7], hole()[:5, :7])
     np.testing.assert_array_equal(
-        inpaint_texture(nothing, ~nothing, colours, colours, nothing * 1.0), colours
-    )
-    start = spanned(colours[:5, :7], hole()[:5, :7])
-    np.testing.assert_array_equal(
-        inpaint_texture(gap[:5, :7], ~gap[:5, :7], colours[:5, :7], start, np.zeros((5, 7))), start
+        inpaint_texture(gap[:5, :7], ~gap[:5, :7], colors[:5, :7], start, np.zeros((5, 7))), start
     )
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_pattern_fits_to_what_is_half_known(seed: int) -> None:
-    colours, gap = spots(), hole()
+    colors, gap = spots(), hole()
     ring = gap & ~hole(9.0)
-    hidden = np.where((gap & ~ring)[..., None], 9.0, colours)
-    start = spanned(np.where(gap[..., None], 9.0, colours), gap)
+    hidden = np.where((gap & ~ring)[..., None], 9.0, colors)
+    start = spanned(np.where(gap[..., None], 9.0, colors), gap)
     alone, fitted = (
         inpaint_texture(gap, ~gap, hidden, start, firm * ring, seed=seed)[ring] for firm in (0.0, 0.8)
     )
-    assert np.abs(fitted - colours[ring]).mean() < 0.6 * np.abs(alone - colours[ring]).mean()
+    assert np.abs(fitted - colors[ring]).mean() < 0.6 * np.abs(alone - colors[ring]).mean()

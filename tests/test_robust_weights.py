@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.rendering.splats.kernels.projection import TILE
+from cagefield.rendering.splats.kernels.projection import TILE_PX
 from cagefield.rendering.splats.rasterizer import tiled, untiled
 from cagefield.training.splats.robust_weights import (
     MIN_BLOCK_WEIGHT,
@@ -14,7 +14,7 @@ from cagefield.training.splats.robust_weights import (
 )
 
 DOWN, ACROSS = 4, 6
-SIZE = ACROSS * TILE, DOWN * TILE
+SIZE = ACROSS * TILE_PX, DOWN * TILE_PX
 ONES = np.ones(3, np.float32)
 
 
@@ -27,7 +27,7 @@ def weights_of(difference: np.ndarray, valid: np.ndarray | None = None, visits: 
             robust.add(n, tiled(rng.normal(0, 0.01, difference.shape).astype(np.float32)), ONES, None)
         robust.add(3, tiled(difference.astype(np.float32)), ONES, valid)
     robust.update_scale()
-    found = np.ones((DOWN * ACROSS, TILE * TILE), np.float32)
+    found = np.ones((DOWN * ACROSS, TILE_PX * TILE_PX), np.float32)
     robust.scale_weights(3, found)
     return untiled(found[:, None], *SIZE)[..., 0]
 
@@ -62,13 +62,13 @@ def test_the_scale_follows_the_usual_residual():
     robust = RobustWeights([(DOWN, ACROSS)])
     robust.update_scale()
     assert robust.scale == MIN_RESIDUAL_SCALE
-    robust.add(0, np.full((DOWN * ACROSS, 3, TILE * TILE), 0.05, np.float32), ONES, None)
+    robust.add(0, np.full((DOWN * ACROSS, 3, TILE_PX * TILE_PX), 0.05, np.float32), ONES, None)
     robust.update_scale()
     assert np.isclose(robust.scale, SCALE_MEDIANS * 0.05 * 3**0.5, rtol=1e-5)
 
 
 def test_a_photo_that_was_not_seen_has_full_weights():
     robust = RobustWeights([(DOWN, ACROSS)])
-    found = np.ones((DOWN * ACROSS, TILE * TILE), np.float32)
+    found = np.ones((DOWN * ACROSS, TILE_PX * TILE_PX), np.float32)
     robust.scale_weights(0, found)
     assert found.min() == 1.0

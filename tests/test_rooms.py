@@ -127,11 +127,11 @@ def test_a_photo_is_linear_in_the_exposure_and_as_noisy_as_stated():
     np.testing.assert_allclose(encode_srgb(decode_srgb(values)), values, atol=1e-12)
     np.testing.assert_allclose(decode_srgb(np.array([0.5])), 0.21404114, rtol=1e-6)
     rng = np.random.RandomState(0)
-    grey = np.full((200, 200, 3), 0.6, np.float32)
-    bright = develop_photo(grey, np.float32([1.3, 1.3, 1.3]), rng) / 255
+    gray = np.full((200, 200, 3), 0.6, np.float32)
+    bright = develop_photo(gray, np.float32([1.3, 1.3, 1.3]), rng) / 255
     assert bright.mean() == pytest.approx(encode_srgb(1.3 * decode_srgb(np.array(0.6))), abs=2e-3)
     assert 0.003 < bright.std() < 0.02
-    pictures = [grey, np.full_like(grey, 0.7), np.full_like(grey, 0.5)]
+    pictures = [gray, np.full_like(gray, 0.7), np.full_like(gray, 0.5)]
     gains = exposure_gains(pictures, 1.0, rng)
     after = [decode_srgb(np.float64(p)).mean() * g.mean() for p, g in zip(pictures, gains, strict=True)]
     # chance of .04 and colour of .012 are left

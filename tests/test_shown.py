@@ -26,13 +26,13 @@ def ground(seed: int = 0) -> GridBlock:
     vertices = np.flatnonzero(z <= TOP + 1)
     solid = (z <= TOP).reshape(-1)[vertices]
     voxel = 2.0 / (VERTICES - 1)
-    colour = 0.2 + 0.15 * np.random.default_rng(seed).standard_normal((len(vertices), 1, 3))
+    color = 0.2 + 0.15 * np.random.default_rng(seed).standard_normal((len(vertices), 1, 3))
     field = VoxelField(
         np.array([[-1.0] * 3, [1.0] * 3]),
         shape,
         vertices,
         np.where(solid, 0.7 / voxel, 0.0).astype(np.float32),
-        ((colour - 0.5) / C0).astype(np.float32),
+        ((color - 0.5) / C0).astype(np.float32),
     )
     return extract_block(field, EditStack(), field.bounds)
 
@@ -48,8 +48,8 @@ def test_what_shows_is_the_mean_of_what_a_ray_meets():
     block = ground()
     surface = extract_surfels(block)
     facing = surface.normals[:, 2] > 0.9
-    colours, opacity = colors_along_normals(block, surface.take(facing))
-    mean = 0.5 + C0 * colours[:, 0]
+    colors, opacity = colors_along_normals(block, surface.take(facing))
+    mean = 0.5 + C0 * colors[:, 0]
     assert opacity.min() > 0.9
     assert mean.std() < 0.7 * 0.15 and abs(float(mean.mean()) - 0.2) < 0.02
 

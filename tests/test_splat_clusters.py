@@ -70,7 +70,7 @@ def test_splats_of_all_kinds_are_kept(antialiased: bool) -> None:
 def seen_by(clusters: Clusters, view: Camera, detail: float = 0.0) -> list[NDArray[np.int32]]:
     lens = intrinsics(view)
     frustum = View.from_region(
-        view.origin, world_to_camera(view), lens.focal, lens.centre, (view.width, view.height), lens.limits,
+        view.origin, world_to_camera(view), lens.focal, lens.center, (view.width, view.height), lens.limits,
         NEAR, pinhole=True,
     )  # fmt: skip
     return clusters.rows(frustum, detail)
@@ -189,7 +189,7 @@ def test_clusters_are_made_once_and_in_the_order_of_others() -> None:
     assert len(first.boxes) == -(-1000 // CLUSTER) and sorted(first.order) == list(range(1000))
     none = DeformedSplats(splats.means[:0], splats.covariances[:0], splats.opacities[:0], splats.sh[:0])
     assert project(none, camera(), near=NEAR, clusters=Clusters.build(none), detail=1.0).pairs == 0
-    assert splat_lod.LEAST > CLUSTER
+    assert splat_lod.MIN_CLUSTERED_SPLATS > CLUSTER
 
 
 def test_clusters_do_not_keep_their_splats_in_memory() -> None:

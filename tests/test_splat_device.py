@@ -15,7 +15,7 @@ from cagefield.rendering.splats import device_rasterizer, reference_rasterizer
 from cagefield.rendering.splats.device_rasterizer import SplatArrays
 from cagefield.rendering.splats.kernels.blending import T_MIN
 from cagefield.rendering.splats.raster_splats import DeformedSplats
-from cagefield.rendering.splats.rasterizer import COLOUR, DEPTH, NORMALS, Projection, intrinsics, project
+from cagefield.rendering.splats.rasterizer import COLOR, DEPTH, NORMALS, Projection, intrinsics, project
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from splat_scenes import random_splats
 from splat_views import NEAR, all_kinds, camera, parameters, single, splats_of, unit
@@ -45,9 +45,9 @@ def test_pictures_are_those_of_the_oracle(lens: str, antialiased: bool, degree: 
     splats = all_kinds(view.origin, degree, antialiased, turned)
     got = on_device(splats, view).picture(DEPTH)
     seen = reference_rasterizer.project(splats, view, NEAR, intrinsics(view).limits)
-    colour, through, depth = reference_rasterizer.blend(seen, view.width, view.height)
+    color, through, depth = reference_rasterizer.blend(seen, view.width, view.height)
     assert db(got[..., 0] - through) > 50.0
-    assert db(got[..., 1:4] - colour) > 50.0
+    assert db(got[..., 1:4] - color) > 50.0
     assert db((got[..., 4] - depth) / np.linalg.norm(view.origin)) > 50.0
 
 
@@ -75,10 +75,10 @@ def test_splats_behind_what_lets_less_than_t_min_through_are_not_drawn() -> None
     values["log_scales"][:] = np.log(5.0)
     values["logits"][:] = 1.0
     splats = single(splats_of(values))
-    picture = on_device(splats, view).picture(COLOUR)
+    picture = on_device(splats, view).picture(COLOR)
     assert picture[..., 0].max() < T_MIN
     front = DeformedSplats(splats.means[:12], splats.covariances[:12], splats.opacities[:12], splats.sh[:12])
-    np.testing.assert_array_equal(on_device(front, view).picture(COLOUR), picture)
+    np.testing.assert_array_equal(on_device(front, view).picture(COLOR), picture)
 
 
 def test_no_splats_and_none_in_sight() -> None:

@@ -50,8 +50,8 @@ def picture(
 ) -> RenderResult:
     """A grey picture of depths and opacities, its normals along z."""
     normals = np.broadcast_to((0.0, 0.0, 1.0), (*shape, 3))
-    grey = np.full((*shape, 3), 0.5)
-    return RenderResult(grey, np.broadcast_to(opacity, shape), np.broadcast_to(depth, shape), normals)
+    gray = np.full((*shape, 3), 0.5)
+    return RenderResult(gray, np.broadcast_to(opacity, shape), np.broadcast_to(depth, shape), normals)
 
 
 # ---- surfaces ----

@@ -140,8 +140,8 @@ def test_weights_and_errors_of_splats() -> None:
     gradients = analytic(values, view, target, background, False)[0]
     limits = intrinsics(view).limits
     seen = reference.project(splats_of(values), view, NEAR, limits)
-    colour, through, _ = reference.blend(seen, view.width, view.height)
-    residual = colour + through[..., None] * background - target
+    color, through, _ = reference.blend(seen, view.width, view.height)
+    residual = color + through[..., None] * background - target
     x, y = np.meshgrid(np.arange(view.width) + 0.5, np.arange(view.height) + 0.5)
     left = np.ones_like(through)
     for k, n in enumerate(seen.rows):

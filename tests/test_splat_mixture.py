@@ -19,7 +19,7 @@ from splat_scenes import random_splats
 def plain_sum(field: SplatField, points: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(sigma [P], rgb [P,3]) from the definition: one splat after the other, Li_1/2 by its series."""
     k = np.arange(1, 3001)
-    total, colour = np.zeros(len(points)), np.zeros((len(points), 3))
+    total, color = np.zeros(len(points)), np.zeros((len(points), 3))
     rotations = rotation_matrices(field.quaternions.astype(float))
     for n in range(len(field)):
         inverse = rotations[n] @ np.diag(np.exp(-2.0 * field.log_scales[n].astype(float))) @ rotations[n].T
@@ -32,8 +32,8 @@ def plain_sum(field: SplatField, points: np.ndarray, along: np.ndarray) -> tuple
         sigma = li * np.sqrt(np.einsum("pi,ij,pj->p", along, inverse, along) / (2.0 * np.pi))
         shown = 0.5 + np.einsum("pt,tc->pc", sh.sh_basis(along, field.sh_degree), field.sh[n].astype(float))
         total += sigma
-        colour += sigma[:, None] * np.maximum(shown, 0.0)
-    return total, np.clip(colour / np.maximum(total, 1e-30)[:, None], 0.0, 1.0)
+        color += sigma[:, None] * np.maximum(shown, 0.0)
+    return total, np.clip(color / np.maximum(total, 1e-30)[:, None], 0.0, 1.0)
 
 
 def unit(values: np.ndarray) -> np.ndarray:
@@ -53,11 +53,11 @@ def test_sums_over_all_splats(degree: int) -> None:
     along = unit(chance.normal(size=points.shape))
     points, along = points.astype(np.float32), along.astype(np.float32)
     sigma, rgb = field(points, along)
-    expected, colour = plain_sum(field, points.astype(float), along.astype(float))
+    expected, color = plain_sum(field, points.astype(float), along.astype(float))
     assert (expected > 0).mean() > 0.8
     # float32 positions against splats of a thousandth: 1e-4 of their size
     np.testing.assert_allclose(sigma, expected, rtol=2e-3, atol=2e-3)
-    np.testing.assert_allclose(rgb[expected > 1e-2], colour[expected > 1e-2], atol=2e-3)
+    np.testing.assert_allclose(rgb[expected > 1e-2], color[expected > 1e-2], atol=2e-3)
 
 
 def test_many_points_at_once_are_the_same_as_few() -> None:
@@ -160,9 +160,9 @@ def test_units_do_not_matter() -> None:
     points = chance.uniform(-1.0, 1.0, (500, 3))
     along = unit(chance.normal(size=(500, 3)))
     sigma, rgb = field(points, along)
-    scaled, colour = large(100.0 * points, along)
+    scaled, color = large(100.0 * points, along)
     np.testing.assert_allclose(scaled * 100.0, sigma, rtol=1e-3, atol=1e-3)
-    np.testing.assert_allclose(colour, rgb, atol=1e-3)
+    np.testing.assert_allclose(color, rgb, atol=1e-3)
 
 
 def test_no_splats_and_splats_that_nobody_sees_are_nothing() -> None:

@@ -14,7 +14,7 @@ from cagefield.rendering.splats import reference_rasterizer as reference
 from cagefield.rendering.splats.kernels.blending import T_MIN
 from cagefield.rendering.splats.raster_splats import DeformedSplats
 from cagefield.rendering.splats.rasterizer import (
-    COLOUR,
+    COLOR,
     DEPTH,
     NORMALS,
     intrinsics,
@@ -35,8 +35,8 @@ def db(error: NDArray) -> float:
 def expected(splats: DeformedSplats, view) -> NDArray:
     """The oracle's picture [H,W,5]: T, colour, depth times weight."""
     seen = reference.project(splats, view, NEAR, intrinsics(view).limits)
-    colour, through, depth = reference.blend(seen, view.width, view.height)
-    return np.concatenate([through[..., None], colour, depth[..., None]], axis=-1)
+    color, through, depth = reference.blend(seen, view.width, view.height)
+    return np.concatenate([through[..., None], color, depth[..., None]], axis=-1)
 
 
 def assert_agrees(splats: DeformedSplats, view) -> NDArray:
@@ -66,9 +66,9 @@ def test_colours_of_each_degree_and_of_turned_splats(degree: int, turned: bool) 
     got = assert_agrees(splats, view)
     if degree:
         flat = replace(splats, sh=np.ascontiguousarray(splats.sh[:, :1]))
-        assert db(got[..., 1:4] - project(flat, view, near=NEAR).picture(COLOUR)[..., 1:4]) < 30.0
+        assert db(got[..., 1:4] - project(flat, view, near=NEAR).picture(COLOR)[..., 1:4]) < 30.0
     if degree and turned:
-        unturned = project(replace(splats, rotations=None), view, near=NEAR).picture(COLOUR)
+        unturned = project(replace(splats, rotations=None), view, near=NEAR).picture(COLOR)
         assert db(got[..., 1:4] - unturned[..., 1:4]) < 30.0
 
 
@@ -79,7 +79,7 @@ def test_extreme_shapes_alone(kind: tuple[int, int]) -> None:
     rows = slice(*kind)
     whole = all_kinds(view.origin)
     splats = DeformedSplats(whole.means[rows], whole.covariances[rows], whole.opacities[rows], whole.sh[rows])
-    got = project(splats, view, near=NEAR).picture(COLOUR)
+    got = project(splats, view, near=NEAR).picture(COLOR)
     want = expected(splats, view)[..., :4]
     assert want[..., 0].min() < 0.99
     error = np.abs(got - want).max(axis=-1)
@@ -102,7 +102,7 @@ def test_long_thin_splats_with_their_means_far_outside(length: float) -> None:
         np.full(3, 0.9),
         0.5 * np.eye(3)[:, None] / harmonics.C0,
     )
-    got = project(single(splats), view, near=NEAR).picture(COLOUR)
+    got = project(single(splats), view, near=NEAR).picture(COLOR)
     want = expected(single(splats), view)[..., :4]
     assert np.ptp(want[..., 0]) > 0.3
     # Float32 knows a position 1300 pixels away to 1e-4 pixels, and a line .55 wide to as much of its alpha.
@@ -238,8 +238,8 @@ def test_values_that_are_extreme_but_finite_leave_no_nan() -> None:
             assert np.isfinite(tiles).all()
             assert tiles[:, 0].min() >= 0.0 and tiles[:, 0].max() <= 1.0
             slopes = chance.normal(size=(seen.tiles, 3, 256)).astype(np.float32)
-            colour = np.ascontiguousarray(tiles[:, 1:4])
-            sums = seen.gradients(colour, slopes, stops)
+            color = np.ascontiguousarray(tiles[:, 1:4])
+            sums = seen.gradients(color, slopes, stops)
             assert np.isfinite(sums[: seen.pairs]).all()
             before = seen.opacity_before(chance.uniform(0, (75, 50), (100, 2)), np.full(100, 5.0))
             assert np.isfinite(before).all()

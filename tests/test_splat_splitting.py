@@ -37,13 +37,13 @@ INNER = Cage.box((0, 0, 0), 0.6)
 def rod(count: int = 7, opacity: float = 0.9) -> SplatField:
     """Long splats one after the other along z, a thin part beside the axis."""
     z = np.linspace(-0.8, 0.8, count)
-    colour = np.stack([1.0 + np.sin(6.0 * z), np.ones(count), 1.0 - np.sin(6.0 * z)], axis=1)
+    color = np.stack([1.0 + np.sin(6.0 * z), np.ones(count), 1.0 - np.sin(6.0 * z)], axis=1)
     return SplatField(
         np.stack([0.0 * z + 0.15, 0.0 * z, z], axis=1),
         np.log(np.tile([0.04, 0.04, 0.9 / (count - 1)], (count, 1))),
         np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
         np.full(count, opacity),
-        colour[:, None],
+        color[:, None],
         bounds=np.array([[-2.0] * 3, [2.0] * 3]),
     )
 

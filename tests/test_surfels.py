@@ -66,10 +66,10 @@ def plane(count: int, noise: float, seed: int) -> Surfels:
     return Surfels(points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
-def sphere(count: int, centre: Array, radius: float, seed: int) -> Surfels:
+def sphere(count: int, center: Array, radius: float, seed: int) -> Surfels:
     normals = np.random.default_rng(seed).normal(size=(count, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return Surfels(centre + radius * normals, normals)
+    return Surfels(center + radius * normals, normals)
 
 
 def test_surfaces_are_where_half_of_the_light_is_stopped() -> None:

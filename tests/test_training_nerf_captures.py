@@ -56,8 +56,8 @@ def tiny(**options) -> NerfConfig:
 
 def flat_psnr(dataset: Dataset) -> float:
     """PSNR of the test photos against the mean colour of the training photos: a picture without content."""
-    colour = np.concatenate([view.load().reshape(-1, 3) for view in dataset.train]).mean(axis=0) / 255
-    return float(np.mean([-10 * np.log10(((v.load() / 255 - colour) ** 2).mean()) for v in dataset.test]))
+    color = np.concatenate([view.load().reshape(-1, 3) for view in dataset.train]).mean(axis=0) / 255
+    return float(np.mean([-10 * np.log10(((v.load() / 255 - color) ** 2).mean()) for v in dataset.test]))
 
 
 def unstated(dataset: Dataset) -> Dataset:

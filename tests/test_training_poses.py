@@ -84,9 +84,9 @@ def test_rough_poses_are_refined(rough):
 
     def off(those):
         """How far pixels in the middle of the photos are off, without what all photos share."""
-        centre = np.zeros((1, 3))
+        center = np.zeros((1, 3))
         apart = [
-            one.project(centre)[0][0] - true.project(centre)[0][0]
+            one.project(center)[0][0] - true.project(center)[0][0]
             for one, true in zip(those, cameras, strict=True)
         ]
         return float(np.sqrt((np.array(apart) ** 2).sum(axis=1).mean()))

@@ -54,11 +54,11 @@ def trained(capture):
     return train_splat(capture, CONFIG)
 
 
-def plain_capture(folder, colour, size=32, count=6, points=None) -> Dataset:
+def plain_capture(folder, color, size=32, count=6, points=None) -> Dataset:
     """Photos of one colour, of 3 or 4 channels."""
     cameras = around(count, 0.3, size)
-    photos = [np.full((size, size, len(colour)), colour, np.uint8) for _ in cameras]
-    return as_dataset(folder, write_views(folder, cameras, photos), points=points, white=len(colour) == 4)
+    photos = [np.full((size, size, len(color)), color, np.uint8) for _ in cameras]
+    return as_dataset(folder, write_views(folder, cameras, photos), points=points, white=len(color) == 4)
 
 
 def ran(dataset: Dataset, steps: int, **settings) -> SplatRun:
@@ -378,12 +378,12 @@ def test_photos_of_another_size_and_distance_do_not_mislead_the_sweep(ball, capt
     alike = capture.train[:14]
     mixed = (alike[0], others[0], *alike[1:8], others[1], *alike[8:])
     positions = capture.points.positions
-    expected, colours, _ = sweep_surface_points(load_views(alike), positions, 300, 0)
+    expected, colors, _ = sweep_surface_points(load_views(alike), positions, 300, 0)
     assert len(expected) > 50 and abs(np.median(np.linalg.norm(expected, axis=1)) - 0.5) < 0.08
     got, rgb, empty = sweep_surface_points(load_views(mixed), positions, 300, 0)
     assert [bool(one.any()) for one in empty] == [n not in (1, 9) for n in range(len(mixed))]
     np.testing.assert_array_equal(got, expected)
-    np.testing.assert_array_equal(rgb, colours)
+    np.testing.assert_array_equal(rgb, colors)
     ran(replace(capture, train=mixed), 20)
 
 

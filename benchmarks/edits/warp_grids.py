@@ -80,9 +80,9 @@ def lattice_picture(warp: BackwardMap, edit: Continuous, side: int, spacing: flo
     in_outer = edit.outer.contains(points)
     red = _inside_out(warp, edit, np.linalg.det(mapped.jacobian), side) * in_outer
     paper, ink = np.empty((2, len(points), 3))
-    for colours, plain, shell, inside in ((paper, _PAPER, _SHELL, _INSIDE), (ink, _FAINT, _INK, _BLUE)):
-        colours[:] = plain
-        colours[in_outer], colours[in_inner] = shell, inside
+    for colors, plain, shell, inside in ((paper, _PAPER, _SHELL, _INSIDE), (ink, _FAINT, _INK, _BLUE)):
+        colors[:] = plain
+        colors[in_outer], colors[in_inner] = shell, inside
     paper += red[:, None] * (np.array(_RED) - paper)
     shown = paper + line[:, None] * (ink - paper)
     return (shown + 0.5).astype(np.uint8).reshape(side, side, 3)
@@ -145,8 +145,8 @@ def grids(
             canvas.paste(larger, (x * _FINE, y * _FINE))
             _outlines(draw, edit, (x, y), style.panel)
             measured = distortion(warp, edit)
-            colour = _DARK_RED if measured.folds else _INK
-            _text(draw, (x + style.panel / 2, y + style.panel + foot / 2), caption(measured), 15, colour)
+            color = _DARK_RED if measured.folds else _INK
+            _text(draw, (x + style.panel / 2, y + style.panel + foot / 2), caption(measured), 15, color)
             report(f"{name} at {angle:g} degrees: {caption(measured)}, stretch {measured.stretch:.2f}")
     for number, note in enumerate(NOTES):
         _text(draw, (left, height - below + 14 + 20 * number), note, 14, (96, 96, 100), anchor="lm")
@@ -162,12 +162,12 @@ def caption(measured: Distortion) -> str:
 
 def _outlines(draw: ImageDraw.ImageDraw, edit: Continuous, at: tuple[int, int], panel: int) -> None:
     """Draws where both cages cut the plane: the outer's box and the turned inner one's."""
-    for cage, colour in ((edit.outer, _INK), (edit.deformed, _BLUE)):
+    for cage, color in ((edit.outer, _INK), (edit.deformed, _BLUE)):
         corners = 0.5 * (cage.corners[:4] + cage.corners[4:])[[0, 1, 3, 2], :2]
         x = at[0] + (corners[:, 0] + VIEW) / (2 * VIEW) * panel
         y = at[1] + (VIEW - corners[:, 1]) / (2 * VIEW) * panel
         around = [(float(a) * _FINE, float(b) * _FINE) for a, b in zip(x, y, strict=True)]
-        draw.line([*around, *around[:2]], fill=colour, width=2 * _FINE, joint="curve")
+        draw.line([*around, *around[:2]], fill=color, width=2 * _FINE, joint="curve")
 
 
 def _text(
@@ -175,8 +175,8 @@ def _text(
     at: tuple[float, float],
     text: str,
     size: int,
-    colour: Colour = _INK,
+    color: Colour = _INK,
     anchor: str = "mm",
 ) -> None:
     font = ImageFont.load_default(size * _FINE)
-    draw.text((at[0] * _FINE, at[1] * _FINE), text, fill=colour, font=font, anchor=anchor)
+    draw.text((at[0] * _FINE, at[1] * _FINE), text, fill=color, font=font, anchor=anchor)

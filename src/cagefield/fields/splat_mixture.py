@@ -111,7 +111,7 @@ class SplatMixture:
         kernels.overlapped_cells(packed, half, levels, sizes, keys, ids)
         by_key = np.argsort(keys, kind="stable")
         cells, first, counts = np.unique(keys[by_key], return_index=True, return_counts=True)
-        table = np.full(1 << (2 * len(cells) + 1).bit_length(), kernels.EMPTY, np.int64)
+        table = np.full(1 << (2 * len(cells) + 1).bit_length(), kernels.FREE_SLOT, np.int64)
         starts, ends = np.zeros(len(table), np.int64), np.zeros(len(table), np.int64)
         slots = kernels.fill_table(cells, table)
         starts[slots], ends[slots] = first, first + counts

@@ -73,7 +73,7 @@ def inverse(corners: Array, targets: Array) -> tuple[Array, Mask]:
     cube is missed.
     """
     C = coefficients(corners)
-    W = centre_inverse(C)
+    W = center_inverse(C)
     y = (targets - C[0]) @ W.T
     rounding = np.finfo(np.float64).eps * np.abs(corners).max() * np.abs(W).sum(axis=1).max()
     on_face = _ON_FACE + 100.0 * rounding
@@ -100,7 +100,7 @@ def inverse(corners: Array, targets: Array) -> tuple[Array, Mask]:
     return u, mask
 
 
-def centre_inverse(C: Array) -> Array:
+def center_inverse(C: Array) -> Array:
     """W [3,3], the inverse of dx/dxi at the centre of the hexahedron with monomial coefficients C [8,3].
 
     A singular one, as only folded hexahedra have, is moved off zero by 1e-9 of its size.

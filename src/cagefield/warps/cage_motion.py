@@ -23,7 +23,14 @@ from cagefield.geometry import hexahedron
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Mask
 from cagefield.warps.extended_coordinates import Extended, slope_columns, straightened_slope
-from cagefield.warps.trilinear_bend import AXES, SIGNS, bend, bends, corner_slopes, stay_one_to_one
+from cagefield.warps.trilinear_bend import (
+    AXIS_COEFFICIENTS,
+    SIGNS,
+    bend,
+    bends,
+    corner_slopes,
+    stay_one_to_one,
+)
 
 LEAST_SIZE = 1e-2
 """The cage is shrunk to no less than this on its way."""
@@ -106,7 +113,7 @@ class Motion:
         F = R @ (V * grown[:, None, :]) @ last
         rate = stretch - (k * np.pi * np.cos(np.pi * t))[:, None]
         dF = omega @ F + R @ (V * (grown * rate)[:, None, :]) @ last
-        c, dc = self._centre(t)
+        c, dc = self._center(t)
         return c, F, dc, dF
 
     @cached_property
@@ -130,8 +137,8 @@ class Motion:
             np.eye(3) + corner_slopes(self.start.bend + t[:, None, None] * going)
         )
 
-    def _centre(self, t: Array) -> tuple[Array, Array]:
-        a, b = self.start.centre, self.end.centre
+    def _center(self, t: Array) -> tuple[Array, Array]:
+        a, b = self.start.center, self.end.center
         if self._straight:
             return a + t[:, None] * (b - a), np.broadcast_to(b - a, (len(t), 3))
         ends = self.confines.coordinates(np.stack([a, b]))
@@ -144,7 +151,7 @@ class Motion:
         """False where the straight way of the cage's centre comes too near to the outer cage."""
         if self.confines.is_affine:
             return True
-        a, b = self.start.centre, self.end.centre
+        a, b = self.start.center, self.end.center
         z = self.confines.coordinates(a + np.linspace(0.0, 1.0, 33)[:, None] * (b - a), enough=1e-7)
         inside = 1.0 - np.abs(z).max(axis=1)
         return bool(inside.min() >= 0.9 * min(inside[0], inside[-1]))
@@ -217,7 +224,7 @@ class Motion:
 def may_bend(inner: Cage, corners: Array) -> Mask:
     """Mask [B] of the valid cages [B,8,3] that the inner cage can become with its bend one to one."""
     C = hexahedron.coefficients(corners)
-    ends = bends(C, np.transpose(C[:, AXES], (0, 2, 1)))
+    ends = bends(C, np.transpose(C[:, AXIS_COEFFICIENTS], (0, 2, 1)))
     start = Extended.from_cage(inner).bend
     if not (start.any() or ends.any()):
         return np.ones(len(corners), dtype=bool)

@@ -10,7 +10,7 @@ import numpy as np
 from cagefield.geometry import hexahedron
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
-from cagefield.warps.trilinear_bend import AXES, SIGNS, bends, bends_one_to_one, forms
+from cagefield.warps.trilinear_bend import AXIS_COEFFICIENTS, SIGNS, bends, bends_one_to_one, forms
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Extended:
     the centre along their normals follow from them.
     """
 
-    centre: Array
+    center: Array
     frame: Array
     bend: Array
 
@@ -30,7 +30,7 @@ class Extended:
     def from_cage(cage: Cage) -> Extended:
         """The coordinates of a cage at rest."""
         C = hexahedron.coefficients(cage.corners)
-        F = np.ascontiguousarray(C[AXES].T)
+        F = np.ascontiguousarray(C[AXIS_COEFFICIENTS].T)
         return Extended(C[0], F, bends(C[None], F[None])[0])
 
     @cached_property
@@ -56,11 +56,11 @@ class Extended:
     def points(self, xi: Array) -> Array:
         """x [N,3] of coordinates xi [N,3]."""
         y = xi if self.is_affine else xi + _factors(xi.T).T @ self.form
-        return self.centre + y @ self.frame.T
+        return self.center + y @ self.frame.T
 
     def coordinates(self, points: Array, start: Array | None = None, enough: float = 1e-14) -> Array:
         """xi [N,3] of points [N,3], by Newton's method from xi = start; see `straighten`."""
-        y = (points - self.centre) @ self.inverse.T
+        y = (points - self.center) @ self.inverse.T
         return y if self.is_affine else straighten(self.form, y, start, enough)
 
     def gradient(self, xi: Array) -> Array:

@@ -1,6 +1,7 @@
 """The lattice of a flow shell, sampled by a Quadrants kernel in float32.
 
-The march of `kernels.flow_shell`, written for `LANES` nodes at a time: the innermost loops run over them,
+The march of `kernels.flow_shell`, written for `NODES_PER_BATCH` nodes at a time: the innermost loops run
+over them,
 have no branches, and keep each number of all of them in one array, so that compilers use vector instructions.
 The table is that of `flow_table`. Two things differ from the march of single samples, by less than the error
 of its steps: it continues in the outer cage's coordinates z, so that only the start of a way is straightened
@@ -19,8 +20,8 @@ from cagefield.compute.devices import floats
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.flow_table import table
 from cagefield.warps.kernels.flow_lattice import (
-    LANES,
     LOST,
+    NODES_PER_BATCH,
     march,
     march_lost,
 )
@@ -39,7 +40,7 @@ def sample(shell: FlowShell, resolution: int) -> NDArray[np.float32]:
     if devices.is_gpu():  # which has a lane for every node
         nodes[:] = LOST
     else:
-        blocks = block_cyclic_schedule(-(-len(nodes) // LANES), 1)
+        blocks = block_cyclic_schedule(-(-len(nodes) // NODES_PER_BATCH), 1)
         march(nodes, blocks, *place, not shell.motion.confines.is_affine, not shell.motion.is_affine)
     lost = np.flatnonzero(nodes[:, 0] == np.float32(LOST)).astype(np.int32)
     if len(lost):

@@ -203,7 +203,7 @@ class FlowShell:
         if self.motion.confines.is_affine:
             return None
         u, inside = self.outer.coordinates(x)
-        affine = (x - self.motion.confines.centre) @ self.motion.confines.inverse.T
+        affine = (x - self.motion.confines.center) @ self.motion.confines.inverse.T
         return np.where(inside[:, None], 2.0 * u - 1.0, affine)
 
     def _velocities(self, times: Array) -> list[FlowVelocity]:

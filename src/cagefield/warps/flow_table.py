@@ -48,7 +48,7 @@ def table_along(shell: FlowShell, knots: Array) -> Array:
     head = np.zeros((HEADER, 3))
     head[0:3], head[3], head[4:7], head[7] = (
         outer.inverse,
-        outer.centre,
+        outer.center,
         outer.frame,
         0.5 * outer.heights / unit,
     )
@@ -59,10 +59,10 @@ def table_along(shell: FlowShell, knots: Array) -> Array:
         head[10:20] = outer.form
     rows = np.zeros((2 * steps + 1, MOMENT, 3))
     rows[:, 0:3] = W @ outer.frame
-    rows[:, 3] = (W @ (outer.centre - c)[:, :, None])[:, :, 0]
+    rows[:, 3] = (W @ (outer.center - c)[:, :, None])[:, :, 0]
     L = outer.inverse @ dF @ W  # velocity in Z per offset of p from the cage's centre
     rows[:, 4:7] = L @ outer.frame
-    rows[:, 7] = (L @ (outer.centre - c)[:, :, None])[:, :, 0] + dc @ outer.inverse.T
+    rows[:, 7] = (L @ (outer.center - c)[:, :, None])[:, :, 0] + dc @ outer.inverse.T
     rows[:, 8] = 1.0 / np.linalg.norm(W, axis=2) / unit
     rows[:-1:2, 9, 0] = np.diff(knots)
     if not motion.is_affine:

@@ -34,7 +34,7 @@ class FlowVelocity:
     """
 
     inner: Extended
-    centre_rate: Array
+    center_rate: Array
     frame_rate: Array
     bend_rate: Array
     outer: Extended
@@ -72,8 +72,8 @@ class FlowVelocity:
         the coordinates around it.
         """
         clamped = xi.clip(-1.0, 1.0)
-        y = (x - self.inner.centre) @ self.inner.inverse.T
-        V = self.centre_rate + y @ self.frame_rate.T
+        y = (x - self.inner.center) @ self.inner.inverse.T
+        V = self.center_rate + y @ self.frame_rate.T
         dV = np.broadcast_to(self.frame_rate @ self.inner.inverse, (len(xi), 3, 3))
         if self.bend_rate.any():
             inside = np.abs(xi) <= 1.0

@@ -26,7 +26,7 @@ COARSE_STRAIN = 1.0
 On the boxes above it costs 2e-7 of the scene for a translation, 2e-3 for the turn by 140 degrees.
 """
 
-CHUNK = 65_536
+POINTS_PER_STEP = 65_536
 """Points mapped between two calls of `proceed`."""
 
 
@@ -42,10 +42,10 @@ def to_deformed(
         shell = warp.shell.with_strain(COARSE_STRAIN) if coarse else warp.shell
         warp = replace(warp, shell=_ForwardFlow(shell, coarse))
     parts = []
-    for first in range(0, max(len(points), 1), CHUNK):
+    for first in range(0, max(len(points), 1), POINTS_PER_STEP):
         if proceed is not None:
             proceed()
-        parts.append(warp.to_deformed(points[first : first + CHUNK]))
+        parts.append(warp.to_deformed(points[first : first + POINTS_PER_STEP]))
     if len(parts) == 1:
         return parts[0]
     return Mapped(

@@ -53,7 +53,7 @@ def map_hexahedron(corners: Array, onto: Array, u: Array) -> tuple[Array, Array]
 def _affine_between(source: Cage, target: Cage) -> tuple[Array, Array] | None:
     """(A, b) that takes the corners of one cage to those of the other, or None."""
     C, D = hexahedron.coefficients(source.corners), hexahedron.coefficients(target.corners)
-    A = D[[1, 2, 4]].T @ hexahedron.centre_inverse(C)
+    A = D[[1, 2, 4]].T @ hexahedron.center_inverse(C)
     bend = D[[3, 5, 6, 7]] - C[[3, 5, 6, 7]] @ A.T
     if np.abs(bend).max() > 1e-12 * np.abs(D[[1, 2, 4]]).max():
         return None

@@ -9,7 +9,7 @@ so inside the cage x is the trilinear map of its corners, and beyond its face a,
 e_as = i_a + d_as, with i_a the unit vector of the axis and d_as, across it, the tilt. Along i_a it would fold
 where the face is bent so far that one of its normals points away from i_a. A face's best direction is the
 middle of the smallest cone that holds its corners' normals; e_as is the first one, on the way from i_a to it,
-with at least `KEPT` of its least component along a normal. A face bent little has no tilt.
+with at least `MIN_NORMAL_SHARE` of its least component along a normal. A face bent little has no tilt.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from cagefield.geometry import hexahedron, hexahedron_determinant
 from cagefield.typing import Array, Mask
 
 BENDS = [3, 5, 6, 7]
-AXES = [1, 2, 4]
+AXIS_COEFFICIENTS = [1, 2, 4]
 
-KEPT = 0.5
+MIN_NORMAL_SHARE = 0.5
 """A direction's least component along its face's normals, as a share of its largest possible value.
 
 Of cages with all corners moved to 95% of the valid distance, 0.14% are refused with 0.3 to 0.7, and 3.4%
@@ -69,7 +69,7 @@ def forms(K: Array) -> Array:
     axis = np.tile(_FACE_AXES, len(K))
     along = np.take_along_axis(n, axis[:, None, None], axis=2)[..., 0]
     # The middle's component along the axis is no less than the normals' least: above this there is no tilt.
-    rows = np.flatnonzero(along.min(axis=1) < np.sqrt(KEPT))
+    rows = np.flatnonzero(along.min(axis=1) < np.sqrt(MIN_NORMAL_SHARE))
     tilts = np.zeros((len(n), 3))
     tilts[rows] = _tilts(n[rows], along[rows], axis[rows])
     return np.concatenate([K, tilts.reshape(-1, 6, 3)], axis=1)
@@ -83,7 +83,7 @@ def _tilts(n: Array, along: Array, axis: NDArray[np.intp]) -> Array:
     d /= np.maximum(d[rows, axis], 0.05)[:, None]
     d[rows, axis] = 0.0
     across = (n @ d[:, :, None])[..., 0]
-    lacking = KEPT * (along + across).min(axis=1, keepdims=True) - along
+    lacking = MIN_NORMAL_SHARE * (along + across).min(axis=1, keepdims=True) - along
     share = np.divide(lacking, across, out=np.zeros_like(across), where=(lacking > 0.0) & (across > 0.0))
     return np.asarray(d * share.max(axis=1, keepdims=True, initial=0.0).clip(0.0, 1.0))
 

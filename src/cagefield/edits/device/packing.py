@@ -99,7 +99,7 @@ def _record(row: NDArray[np.float32], number: int, corners: Array, onto: Array |
     """Write the record of a hexahedron [8,3] and, if it has one, of its image [8,3]."""
     C = hexahedron.coefficients(corners)
     D = C if onto is None else hexahedron.coefficients(onto)
-    W = hexahedron.centre_inverse(C)
+    W = hexahedron.center_inverse(C)
     bend = C[[3, 5, 6, 7]] @ W.T
     y = (corners - C[0]) @ W.T
     # Affine only where the image is, too: an affine record skips the image's bend.

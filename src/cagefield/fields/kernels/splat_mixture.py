@@ -26,7 +26,7 @@ INVERSE_ROOT_TAU = 0.3989422804014327
 SERIES_LIMIT_W = 1.6
 """w = -ln z that separates the series in w from the series in z; both are accurate to 1e-6 there."""
 
-EMPTY = -1
+FREE_SLOT = -1
 """Key of a free slot."""
 
 
@@ -50,7 +50,7 @@ def polylog_half(w):
 
 @njit(inline="always", **FAST)
 def cell_key(level, x, y, z):
-    """64-bit key of a cell, never EMPTY: its coordinates mixed by the finalizer of SplitMix64."""
+    """64-bit key of a cell, never FREE_SLOT: its coordinates mixed by the finalizer of SplitMix64."""
     h = np.uint64(level) * np.uint64(0x9E3779B97F4A7C15)
     for part in (x, y, z):
         h = (h ^ np.uint64(part)) + np.uint64(0x9E3779B97F4A7C15)
@@ -96,12 +96,12 @@ def overlapped_cells(packed, half, levels, sizes, keys, ids):
 
 @njit(**FAST)
 def fill_table(cells, table):
-    """Insert keys [M] into the open-addressing table [2^b] (EMPTY before); returns the slots."""
+    """Insert keys [M] into the open-addressing table [2^b] (FREE_SLOT before); returns the slots."""
     slots = np.empty(len(cells), np.int64)
     mask = len(table) - 1
     for n in range(len(cells)):
         slot = cells[n] & mask
-        while table[slot] != EMPTY:
+        while table[slot] != FREE_SLOT:
             slot = (slot + 1) & mask
         table[slot] = cells[n]
         slots[n] = slot
@@ -113,7 +113,7 @@ def find_slot(table, key):
     """Slot of a key, or -1."""
     mask = len(table) - 1
     slot = key & mask
-    while table[slot] != EMPTY:
+    while table[slot] != FREE_SLOT:
         if table[slot] == key:
             return slot
         slot = (slot + 1) & mask

@@ -14,7 +14,7 @@ from cagefield.errors import FieldError
 from cagefield.files import yaml_text
 from cagefield.files.safe_open import read_text
 
-NAMES = ("args.txt", "config.txt", "config.yml", "config.yaml")
+CONFIG_NAMES = ("args.txt", "config.txt", "config.yml", "config.yaml")
 
 _CURE = "give the config of the checkpoint's own training (--config)"
 
@@ -48,7 +48,9 @@ class SamplingSettings:
 
 def find_config(checkpoint: Path) -> Path | None:
     """Path of the config beside a checkpoint, or None."""
-    return next((checkpoint.parent / name for name in NAMES if (checkpoint.parent / name).is_file()), None)
+    return next(
+        (checkpoint.parent / name for name in CONFIG_NAMES if (checkpoint.parent / name).is_file()), None
+    )
 
 
 def read_config(path: Path | str) -> SamplingSettings:

@@ -16,7 +16,7 @@ from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
 from cagefield.compute.devices import floats, ints
 from cagefield.rendering.splats.kernels import device_rasterizer as kernels
-from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE
+from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE_PX
 from cagefield.rendering.splats.raster_splats import DeformedSplats
 from cagefield.rendering.splats.rasterizer import DEPTH, Region, intrinsics, untiled, world_to_camera
 from cagefield.rendering.voxels.device_grid import to_device
@@ -61,7 +61,7 @@ class DeviceProjection:
     @property
     def across(self) -> int:
         """Tiles in a row of the picture."""
-        return -(-self.width // TILE)
+        return -(-self.width // TILE_PX)
 
     @property
     def tiles(self) -> int:
@@ -104,7 +104,7 @@ def project(
     packed, keys = _empty(arrays.count * PACKED), _empty(arrays.count)
     boxes = to_device(np.zeros(max(1, arrays.count) * 4, np.int32))
     origin = camera.origin.astype(np.float32).astype(np.float64)
-    across, down = -(-width // TILE), -(-height // TILE)
+    across, down = -(-width // TILE_PX), -(-height // TILE_PX)
     kernels.project(
         arrays.means,
         arrays.covariances,
@@ -117,7 +117,7 @@ def project(
         floats(origin),
         floats(camera.origin - origin),
         floats(lens.focal),
-        floats(lens.centre - (x, y)),
+        floats(lens.center - (x, y)),
         ints((width, height)),
         floats(lens.limits),
         floats(lens.coefficients),

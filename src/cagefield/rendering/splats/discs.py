@@ -15,7 +15,7 @@ from cagefield.cameras import lenses
 from cagefield.cameras.camera import Camera
 from cagefield.errors import CagefieldError
 from cagefield.rendering.splats.kernels import discs
-from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE
+from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE_PX
 from cagefield.rendering.splats.raster_splats import NO_ROTATIONS, DeformedSplats
 from cagefield.rendering.splats.rasterizer import (
     DEPTH,
@@ -52,7 +52,13 @@ class DiscProjection:
         out = np.empty((len(self.starts) - 1, channels, AREA), np.float32)
         with kernels():
             discs.blend(
-                self.packed, self.ids, self.starts, -(-width // TILE), np.float32(self.near), channels, out
+                self.packed,
+                self.ids,
+                self.starts,
+                -(-width // TILE_PX),
+                np.float32(self.near),
+                channels,
+                out,
             )
         picture = untiled(out, width, height)
         if channels >= DEPTH:
@@ -69,7 +75,7 @@ class DiscProjection:
                 self.packed,
                 self.ids,
                 self.starts,
-                -(-self.region[2] // TILE),
+                -(-self.region[2] // TILE_PX),
                 np.float32(self.near),
                 np.ascontiguousarray(pixels, np.float32),
                 np.ascontiguousarray(depths, np.float32),
@@ -119,7 +125,7 @@ def project_discs(
             world_to_camera(camera),
             camera.origin.astype(np.float64),
             lens.focal,
-            lens.centre - (x, y),
+            lens.center - (x, y),
             np.array((width, height)),
             lens.limits,
             lens.model,

@@ -19,7 +19,7 @@ from cagefield.cameras import lenses
 from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
 from cagefield.rendering.splats.kernels import blending, projection, tile_binning
-from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE
+from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE_PX
 from cagefield.rendering.splats.raster_splats import NO_ROTATIONS, DeformedSplats
 from cagefield.rendering.splats.splat_lod import Clusters, View
 from cagefield.typing import Float32
@@ -40,7 +40,7 @@ _GRAZING = 0.05
 OUTSIDE = 0.3
 """How far outside the picture, in shares of its half-size, a splat's shape still follows where it is."""
 
-NEAR = 0.04
+NEAR_HALF_DIAGONALS = 0.04
 """Depth at which drawing starts, in half-diagonals of the box of interest."""
 
 NOWHERE: Float32 = np.zeros((2, 1, 1), np.float32)
@@ -55,7 +55,7 @@ _SHARES = np.concatenate(
 _OPACITIES = np.interp(np.linspace(0.0, projection.DEEPEST, 1024), spence(1.0 - _SHARES), _SHARES)
 """Opacities o at equal steps of Li2(o); scipy's `spence(1 - o)` is Li2(o)."""
 
-COLOUR, DEPTH, NORMALS = 4, 5, 8
+COLOR, DEPTH, NORMALS = 4, 5, 8
 """Channels of a picture: T and colour; depth as well; normals as well."""
 
 
@@ -64,7 +64,7 @@ class Intrinsics:
     """A camera's intrinsics for the kernels; `limits` are x low, x high, y low, y high of n = (x/z, y/z)."""
 
     focal: NDArray[np.float64]
-    centre: NDArray[np.float64]
+    center: NDArray[np.float64]
     size: NDArray[np.int64]
     limits: NDArray[np.float64]
     model: int
@@ -89,7 +89,7 @@ class Projection:
     @property
     def across(self) -> int:
         """Tiles in a row of the picture."""
-        return -(-self.width // TILE)
+        return -(-self.width // TILE_PX)
 
     @property
     def tiles(self) -> int:
@@ -110,7 +110,7 @@ class Projection:
 
     def gradients(
         self,
-        colour: Float32,
+        color: Float32,
         slopes: Float32,
         stops: NDArray[np.int64],
         sums: Float32 | None = None,
@@ -131,7 +131,7 @@ class Projection:
             sums = np.empty((self.pairs, blending.SUMS), np.float32)
         with kernels():
             blending.gradients(
-                self.packed, self.ids, self.starts, stops, self.width, self.height, colour, slopes, weights,
+                self.packed, self.ids, self.starts, stops, self.width, self.height, color, slopes, weights,
                 empty, np.float32(veil), sums,
             )  # fmt: skip
         return sums
@@ -207,7 +207,7 @@ def project(
         sources = [_Source(splats, np.arange(len(splats), dtype=np.int32))]
     else:
         view = View.from_region(
-            origin, W, lens.focal, lens.centre - (x, y), (width, height), lens.limits, near,
+            origin, W, lens.focal, lens.center - (x, y), (width, height), lens.limits, near,
             pinhole=lens.model == projection.PINHOLE,
         )  # fmt: skip
         with kernels():
@@ -238,7 +238,7 @@ def project(
                 W,
                 origin,
                 lens.focal,
-                lens.centre - (x, y),
+                lens.center - (x, y),
                 np.array((width, height)),
                 lens.limits,
                 lens.model,
@@ -277,7 +277,7 @@ def pairs_of_tiles(
     order = every[np.argsort(keys[every])]
     boxes = tiles[every]
     most = int(((boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2])).sum(dtype=np.int64))
-    across, down = -(-width // TILE), -(-height // TILE)
+    across, down = -(-width // TILE_PX), -(-height // TILE_PX)
     starts = np.empty(across * down + 1, np.int64)
     firsts = np.empty(len(order) + 1, np.int64)
     ids, slots = buffers.take("ids", (most,), np.int32), buffers.take("slots", (most,), np.int32)
@@ -354,18 +354,18 @@ def _border(width: int, height: int) -> NDArray[np.float64]:
 def tiled(picture: NDArray[Any]) -> NDArray[Any]:
     """A picture [H,W,C] as tiles [tiles,C,AREA], filled up with zeros."""
     height, width, channels = picture.shape
-    down, across = -(-height // TILE), -(-width // TILE)
-    padded = np.zeros((down * TILE, across * TILE, channels), picture.dtype)
+    down, across = -(-height // TILE_PX), -(-width // TILE_PX)
+    padded = np.zeros((down * TILE_PX, across * TILE_PX, channels), picture.dtype)
     padded[:height, :width] = picture
-    split = padded.reshape(down, TILE, across, TILE, channels).transpose(0, 2, 4, 1, 3)
+    split = padded.reshape(down, TILE_PX, across, TILE_PX, channels).transpose(0, 2, 4, 1, 3)
     return np.ascontiguousarray(split).reshape(down * across, channels, AREA)
 
 
 def untiled(tiles: NDArray[Any], width: int, height: int) -> NDArray[Any]:
     """The picture [H,W,C] of tiles [tiles,C,AREA]."""
-    down, across = -(-height // TILE), -(-width // TILE)
-    split = tiles.reshape(down, across, tiles.shape[1], TILE, TILE).transpose(0, 3, 1, 4, 2)
-    return np.ascontiguousarray(split.reshape(down * TILE, across * TILE, -1)[:height, :width])
+    down, across = -(-height // TILE_PX), -(-width // TILE_PX)
+    split = tiles.reshape(down, across, tiles.shape[1], TILE_PX, TILE_PX).transpose(0, 3, 1, 4, 2)
+    return np.ascontiguousarray(split.reshape(down * TILE_PX, across * TILE_PX, -1)[:height, :width])
 
 
 class kernels:  # noqa: N801
@@ -383,4 +383,4 @@ class kernels:  # noqa: N801
 
 def near_depth(bounds: NDArray[Any]) -> float:
     """The depth from which splats are drawn: nearer ones would be smeared over the picture. World units."""
-    return NEAR * 0.5 * float(np.linalg.norm(bounds[1] - bounds[0]))
+    return NEAR_HALF_DIAGONALS * 0.5 * float(np.linalg.norm(bounds[1] - bounds[0]))

@@ -41,17 +41,17 @@ def render_discs(
     axes = rotation_matrices(field.quaternions[rows].astype(np.float64))
     axes = axes[:, :, :2] * np.exp(field.log_scales[rows, None, :2].astype(np.float64))
     T = np.concatenate([W @ axes, p[rows, :, None]], axis=2)
-    focal, centre = np.array([camera.fx, camera.fy]), np.array([camera.cx, camera.cy])
-    means = lenses.project(p[rows], camera.model, camera.distortion) * focal + centre
+    focal, center = np.array([camera.fx, camera.fy]), np.array([camera.cx, camera.cy])
+    means = lenses.project(p[rows], camera.model, camera.distortion) * focal + center
     along = offsets[rows] / np.linalg.norm(offsets[rows], axis=1, keepdims=True)
-    colours = 0.5 + np.einsum(
+    colors = 0.5 + np.einsum(
         "nk,nkc->nc", sh.sh_basis(along, field.sh_degree), field.sh[rows].astype(np.float64)
     )
     x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    pixels = (np.stack([x, y], axis=-1).reshape(-1, 2) - centre) / focal
+    pixels = (np.stack([x, y], axis=-1).reshape(-1, 2) - center) / focal
     rays = lenses.unproject(pixels, camera.model, camera.distortion)[0].reshape(*x.shape, 3)
     n_x, n_y = rays[..., 0] / rays[..., 2], rays[..., 1] / rays[..., 2]
-    colour, through = np.zeros((*x.shape, 3)), np.ones(x.shape)
+    color, through = np.zeros((*x.shape, 3)), np.ones(x.shape)
     depth = np.zeros(x.shape)
     for n, row in enumerate(rows):
         hit = np.cross(n_x[..., None] * T[n, 2] - T[n, 0], n_y[..., None] * T[n, 2] - T[n, 1])
@@ -63,11 +63,11 @@ def render_discs(
         alpha = field.opacities[row] * np.exp(-0.5 * np.minimum(inside, dot))
         alpha = np.where((alpha < ALPHA_MIN) | (z < near), 0.0, np.minimum(alpha, ALPHA_MAX))
         weight = alpha * through
-        colour += weight[..., None] * np.maximum(colours[n], 0.0)
+        color += weight[..., None] * np.maximum(colors[n], 0.0)
         depth += np.where(alpha > 0.0, weight * z, 0.0)
         through *= 1.0 - alpha
     opacity = 1.0 - through
     depth /= rays[..., 2]
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = np.where(opacity > 1e-6, depth / opacity, np.inf)
-    return RenderResult.from_premultiplied(colour, opacity, distance, background=background)
+    return RenderResult.from_premultiplied(color, opacity, distance, background=background)

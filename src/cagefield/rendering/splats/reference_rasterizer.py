@@ -36,7 +36,7 @@ class ProjectedSplats:
     means: AnyArray
     conics: AnyArray
     opacities: AnyArray
-    colours: AnyArray
+    colors: AnyArray
     distances: AnyArray
     slopes: AnyArray
 
@@ -69,23 +69,23 @@ def project(
     slopes = np.einsum("ni,nij,nkj,nkl->nl", along, C, M, np.linalg.inv(flat + SLOPE_BLUR * np.eye(2)))
     turned = along if splats.rotations is None else np.einsum("nji,nj->ni", splats.rotations[rows], along)
     degree = int(np.sqrt(splats.sh.shape[1])) - 1
-    colours = 0.5 + np.einsum("nk,nkc->nc", sh.sh_basis(turned, degree), splats.sh[rows].astype(np.float64))
-    return ProjectedSplats(rows, means, conics, opacities, np.maximum(colours, 0.0), distance, slopes)
+    colors = 0.5 + np.einsum("nk,nkc->nc", sh.sh_basis(turned, degree), splats.sh[rows].astype(np.float64))
+    return ProjectedSplats(rows, means, conics, opacities, np.maximum(colors, 0.0), distance, slopes)
 
 
 def blend(projected: ProjectedSplats, width: int, height: int) -> tuple[AnyArray, AnyArray, AnyArray]:
     """(colour [H,W,3] without background, T [H,W], depth times weight [H,W])."""
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
-    colour, through, depth = np.zeros((height, width, 3)), np.ones((height, width)), np.zeros((height, width))
+    color, through, depth = np.zeros((height, width, 3)), np.ones((height, width)), np.zeros((height, width))
     for n in range(len(projected.rows)):
         d = np.stack([x - projected.means[n, 0], y - projected.means[n, 1]], axis=-1)
         alpha = projected.opacities[n] * np.exp(-0.5 * np.einsum("hwi,ij,hwj->hw", d, projected.conics[n], d))
         alpha = np.where(alpha < ALPHA_MIN, 0.0, np.minimum(alpha, ALPHA_MAX))
         weight = alpha * through
-        colour += weight[..., None] * projected.colours[n]
+        color += weight[..., None] * projected.colors[n]
         depth += weight * (projected.distances[n] + d @ projected.slopes[n])
         through *= 1.0 - alpha
-    return colour, through, depth
+    return color, through, depth
 
 
 def render(
@@ -97,11 +97,11 @@ def render(
     limits: AnyArray | None = None,
 ) -> RenderResult:
     """The frame that the camera sees."""
-    colour, through, depth = blend(project(splats, camera, near, limits), camera.width, camera.height)
+    color, through, depth = blend(project(splats, camera, near, limits), camera.width, camera.height)
     opacity = 1.0 - through
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = np.where(opacity > 1e-6, depth / opacity, np.inf)
-    return RenderResult.from_premultiplied(colour, opacity, distance, background=background)
+    return RenderResult.from_premultiplied(color, opacity, distance, background=background)
 
 
 def _jacobians(p: AnyArray, camera: Camera, limits: AnyArray | None) -> AnyArray:

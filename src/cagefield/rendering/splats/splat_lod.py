@@ -26,7 +26,7 @@ CLUSTER = 256
 GROUPS = (8, 8)
 """Elements merged into one representative at each level: splats, then representatives."""
 
-LEAST = 100_000
+MIN_CLUSTERED_SPLATS = 100_000
 """Fewer splats are drawn without clusters: projecting them all costs less than 15 ms."""
 
 LARGEST = (1 / 64, 1 / 4096)
@@ -54,7 +54,7 @@ class View:
         origin: NDArray[np.float64],
         W: NDArray[np.float64],
         focal: NDArray[np.float64],
-        centre: NDArray[np.float64],
+        center: NDArray[np.float64],
         size: tuple[int, int],
         limits: NDArray[np.float64],
         near: float,
@@ -70,7 +70,7 @@ class View:
         planes, reaches = [], []
         blur = float(kernels.FARTHEST * np.sqrt(BLUR)) + 1e-3
         for axis in range(2 if pinhole else 0):
-            f, c = focal[axis], centre[axis]
+            f, c = focal[axis], center[axis]
             slope = float(np.abs(limits[2 * axis : 2 * axis + 2]).max())
             planes += [f * W[axis] + (c + blur) * W[2], -f * W[axis] + (size[axis] - c + blur) * W[2]]
             reaches += [f * np.sqrt(1.0 + slope**2)] * 2
@@ -115,7 +115,7 @@ class Clusters:
         if found is None:
             same = like is not None and len(like.order) == len(splats)
             order = like.order if like is not None and same else _ordered(splats)
-            boxes = np.empty((-(-len(splats) // CLUSTER), kernels.BOX), np.float32)
+            boxes = np.empty((-(-len(splats) // CLUSTER), kernels.CLUSTER_FLOATS), np.float32)
             kernels.boxes(splats.means, splats.covariances, splats.opacities, order, CLUSTER, boxes)
             # Rounding may not make a box smaller.
             boxes[:, 3:7] += 1e-6 * (np.abs(boxes[:, :3]).max(axis=1, keepdims=True) + boxes[:, 3:7])

@@ -32,7 +32,7 @@ from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.forward import to_deformed
 from cagefield.warps.hexahedron_map import HexahedronMap
 
-UNSEEN = 0.01
+MIN_LOG_GAIN = 0.01
 """The log of a change of light that is left out."""
 
 KEPT_STACKS = 6
@@ -178,7 +178,7 @@ class MovedSplats:
         outside = np.ones(len(points), bool) if isinstance(edit, Paste) else ~edit.inner.contains(points)
         gone = patch.takes_away(points) & outside
         log = np.where(outside, patch.light.at(points), 0.0)
-        lit = np.flatnonzero((np.abs(log[: len(still)]) > UNSEEN) & ~gone[: len(still)])
+        lit = np.flatnonzero((np.abs(log[: len(still)]) > MIN_LOG_GAIN) & ~gone[: len(still)])
         gains[:here] *= np.exp(log[len(still) :])[:, None]
         left = self.left.copy()
         left[still[gone[: len(still)]]] = True

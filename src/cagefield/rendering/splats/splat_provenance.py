@@ -18,7 +18,7 @@ from cagefield.edits import EditMap, Paste, PreparedEdit
 from cagefield.fields.splat_field import SplatField
 from cagefield.typing import Float32, Mask
 
-KEPT = 3
+MAX_KEPT_FIELDS = 3
 """Joined fields that are kept of one field."""
 
 Pasted = tuple[SplatField, ...]
@@ -59,7 +59,7 @@ def with_pasted(field: SplatField, edits: EditMap) -> SplatField:
         counts = [len(field), *(len(part) for part in splats)]
         numbers = np.repeat(np.arange(-1, len(splats), dtype=np.int32), counts)
         _origins[found] = _Origins(numbers, splats, ref(field))
-    known[:] = [(splats, found), *(each for each in known if each[1] is not found)][:KEPT]
+    known[:] = [(splats, found), *(each for each in known if each[1] is not found)][:MAX_KEPT_FIELDS]
     return found
 
 

@@ -25,7 +25,7 @@ from cagefield.rendering.splats.rasterizer import (
     near_depth,
     project,
 )
-from cagefield.rendering.splats.splat_lod import LEAST, Clusters
+from cagefield.rendering.splats.splat_lod import MIN_CLUSTERED_SPLATS, Clusters
 from cagefield.rendering.splats.splitting import split_of
 from cagefield.typing import Float32
 
@@ -174,7 +174,7 @@ class SplatRenderer:
             region=region,
             normals=self._normals if normals else None,
             buffers=self._buffers,
-            clusters=self._clusters() if len(self.splats) >= LEAST else None,
+            clusters=self._clusters() if len(self.splats) >= MIN_CLUSTERED_SPLATS else None,
             detail=0.0 if normals else detail,
         )
 

@@ -75,7 +75,7 @@ SHADE = 0.15
 FAINT = 0.3
 """Splats of less opacity than this may bend more, as much as they are fainter."""
 
-UNSEEN = 1.0 / 255.0
+MIN_DRAWN_OPACITY = 1.0 / 255.0
 """Splats of at most this opacity are not drawn, and no children."""
 
 SPACING = 1.6
@@ -308,10 +308,10 @@ def _rows(field: SplatField, rows: NDArray[np.int64], change: Array, most: float
     """Rows of children for those splats [M] that change by more than `most` along an axis: change [M,3]."""
     axis, worst = change.argmax(axis=1), change.max(axis=1)
     opacity = field.opacities[rows].astype(np.float64)
-    split = np.flatnonzero((worst * np.minimum(1.0, opacity / FAINT) > most) & (opacity > UNSEEN))
+    split = np.flatnonzero((worst * np.minimum(1.0, opacity / FAINT) > most) & (opacity > MIN_DRAWN_OPACITY))
     r = np.maximum(most / worst[split], LEAST_WIDTH)
     children = _row(rows[split], np.eye(3)[axis[split]], r, opacity[split])
-    return children.take(np.flatnonzero(children.opacity > UNSEEN))
+    return children.take(np.flatnonzero(children.opacity > MIN_DRAWN_OPACITY))
 
 
 def _row(parent: NDArray[np.int64], direction: Array, r: Array, opacity: Array) -> _Children:

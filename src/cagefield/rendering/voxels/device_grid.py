@@ -93,15 +93,15 @@ class DeviceGrid:
         first = int(np.prod(self.field.resolution))
         index = np.zeros(slices * ny * nz, np.int32)
         index[:first] = base.index.to_numpy()
-        densities, colours = [base.density.to_numpy()], [base.sh.to_numpy()]
+        densities, colors = [base.density.to_numpy()], [base.sh.to_numpy()]
         stored = len(densities[0])
         for place, layer in dict(zip(places, layers, strict=True)).items():
             vertices, density, sh = _by_brick(layer)
             index[vertices + place * ny * nz] = np.arange(stored, stored + len(vertices), dtype=np.int32)
             stored += len(vertices)
             densities.append(density)
-            colours.append(sh.reshape(-1))
-        values, coefficients = np.concatenate(densities), np.concatenate(colours)
+            colors.append(sh.reshape(-1))
+        values, coefficients = np.concatenate(densities), np.concatenate(colors)
         return DeviceGrid(
             self.field, to_device(index), to_device(values), to_device(coefficients), layers, base
         )

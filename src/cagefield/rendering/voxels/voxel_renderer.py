@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 BAND = 4
 """Rows of tiles rendered between two calls of `proceed`."""
 
-KEPT = 8
+MAX_KEPT_INTRINSICS = 8
 """Cameras' intrinsics whose directions stay on the device."""
 
 
@@ -143,7 +143,7 @@ class VoxelRenderer:
         x, y, width, height = _checked_region(region, camera)
         directions = self._device_directions(camera)
         out = self._buffer(width, height)
-        down = -(-height // march.TILE)
+        down = -(-height // march.MARCH_TILE_PX)
         grid = self.grid.args
         length = step or self.step
         if not field.contracted:
@@ -159,7 +159,9 @@ class VoxelRenderer:
             few = min(rows, down - row)
             march.march_tiles(
                 out,
-                block_cyclic_schedule(-(-width // march.TILE) * few * march.TILE**2, march.TILE**2),
+                block_cyclic_schedule(
+                    -(-width // march.MARCH_TILE_PX) * few * march.MARCH_TILE_PX**2, march.MARCH_TILE_PX**2
+                ),
                 pose,
                 march.TileArgs(ints((x, y)), ints((width, height)), row, few),
                 how,
@@ -182,7 +184,7 @@ class VoxelRenderer:
 
         local = camera.local_directions()
         if id(local) not in self._directions:
-            if len(self._directions) >= KEPT:
+            if len(self._directions) >= MAX_KEPT_INTRINSICS:
                 del self._directions[next(iter(self._directions))]
             self._directions[id(local)] = (local, to_device(local))
         return self._directions[id(local)][1]

@@ -98,7 +98,7 @@ def sweep_surfaces(
             rotations,
             origins,
             np.stack([one.focal for one in lens]),
-            np.stack([one.centre for one in lens]),
+            np.stack([one.center for one in lens]),
             np.array([one.model for one in lens]),
             np.stack([one.coefficients for one in lens]),
             chosen,

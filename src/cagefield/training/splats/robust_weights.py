@@ -23,7 +23,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.rendering.splats.kernels.projection import AREA, TILE
+from cagefield.rendering.splats.kernels.projection import AREA, TILE_PX
 
 BLOCK_PIXELS = 8
 """Side of a block."""
@@ -43,7 +43,7 @@ MIN_BLOCK_WEIGHT = 0.15
 ROBUST_START_PROGRESS = 0.25
 """Progress from which weights apply; earlier the field is too coarse to contradict a photo."""
 
-_SIDE = TILE // BLOCK_PIXELS
+_SIDE = TILE_PX // BLOCK_PIXELS
 
 
 class RobustWeights:

@@ -16,10 +16,10 @@ from cagefield.cameras.camera import Camera
 from cagefield.datasets.views import Dataset
 from cagefield.fields.splat_field import SplatField
 from cagefield.rendering.splats.kernels.blending import SUMS
-from cagefield.rendering.splats.kernels.projection import AREA, TILE
+from cagefield.rendering.splats.kernels.projection import AREA, TILE_PX
 from cagefield.rendering.splats.raster_splats import DeformedSplats
 from cagefield.rendering.splats.rasterizer import (
-    COLOUR,
+    COLOR,
     Buffers,
     Projection,
     intrinsics,
@@ -118,7 +118,7 @@ class SplatRun:
         self.gains = np.ones((len(self.views), 3), np.float32)
         sizes = [(view.cameras[0].width, view.cameras[0].height) for view in self.views]
         self._robust = (
-            RobustWeights([(-(-h // TILE), -(-w // TILE)) for w, h in sizes]) if config.robust else None
+            RobustWeights([(-(-h // TILE_PX), -(-w // TILE_PX)) for w, h in sizes]) if config.robust else None
         )
         self.poses = PoseRefinement(len(self.views), self._scale)
         self._buffers = Buffers()
@@ -170,7 +170,7 @@ class SplatRun:
             opacities *= self._rng.random(count, np.float32) >= config.dropout * done
         splats = DeformedSplats(state.means, covariances, opacities, state.sh, None, config.antialiased)
         projected = project(splats, camera, near=self._near, buffers=self._buffers)
-        out, stops = projected.blend(COLOUR)
+        out, stops = projected.blend(COLOR)
         color = self._buffers.take("color", (projected.tiles, 3, AREA), np.float32)
         slopes = self._buffers.take("slopes", (projected.tiles, 3, AREA), np.float32)
         tile_sums = np.empty((projected.tiles, 7), np.float32)

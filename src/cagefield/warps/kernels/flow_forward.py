@@ -5,7 +5,8 @@ layout of the table, and its knots give the direction of the flow: from 0 to 1 i
 deformed
 space. D is dZ/dp of the way so far; with the velocity w V, dD/dt = w (dV/dZ) D + V (dw/dZ D).
 
-Points are taken `LANES` at a time: the innermost loops run over them, have no branches, and all their
+Points are taken `POINTS_PER_BATCH` at a time: the innermost loops run over them, have no branches, and all
+their
 data lie in one buffer at constant offsets, so that compilers use vector instructions. Coordinates of bent
 cages are followed by Newton's method from those of the last stage, `newton_steps` a stage; points that need
 more
@@ -23,15 +24,16 @@ from cagefield.compute.numba_cache import FAST, njit
 from cagefield.warps.flow_table import HEADER, MOMENT
 
 f32, U = np.float32, np.uint64
-LANES = U(32)
+POINTS_PER_BATCH = U(32)
 
-START_STEPS = 8
+START_NEWTON_STEPS = 8
 """Newton's steps for the coordinates at the start of a way."""
 
-AT_REST = f32(1e-6)
+MIN_FACE_SHARE = f32(1e-6)
 """Points nearer than this to the outer cage's faces, as a share of its half-width, stay."""
 
-# Rows of the buffer, of LANES numbers each: the place Z and D by rows at the start of a step, the stage's Z,
+# Rows of the buffer, of POINTS_PER_BATCH numbers each: the place Z and D by rows at the start of a step,
+# the stage's Z,
 # the coordinates z and xi, the rates of Z and D, their weighted sums, dz/dZ and dxi/dZ by rows, V, dV/dZ by
 # rows, the last residual of coordinates and the largest at the end of a stage.
 _Z, _D, _X, _OUTER, _INNER = (U(32 * n) for n in (0, 3, 12, 15, 18))
@@ -54,19 +56,19 @@ def march(points, exact, bent_outer, bent_inner, newton_steps, followed, moved, 
         count = min(32, len(points) - first)
         _begin(points, first, count, exact, s)
         if bent_outer:
-            for l in range(LANES):
+            for l in range(POINTS_PER_BATCH):
                 for a in range(3):
                     s[_OUTER + U(32 * a) + l] = min(max(s[_Z + U(32 * a) + l], -f32(1.0)), f32(1.0))
-            for _ in range(START_STEPS):
+            for _ in range(START_NEWTON_STEPS):
                 _follow(s, _OUTER, _Z, table, U(10))
         if bent_inner:
             _affine(s, _Z, _V, table, U(HEADER))
-            for l in range(LANES):
+            for l in range(POINTS_PER_BATCH):
                 for a in range(3):
                     s[_INNER + U(32 * a) + l] = s[_V + U(32 * a) + l]
-            for _ in range(START_STEPS):
+            for _ in range(START_NEWTON_STEPS):
                 _follow(s, _INNER, _V, table, U(HEADER + 10))
-        for l in range(LANES):
+        for l in range(POINTS_PER_BATCH):
             s[_LOST + l] = f32(0.0)
         steps = int(table[8, 0])
         for n in range(steps):
@@ -125,7 +127,7 @@ def _affine(s, source, to, table, row):
     for a in range(U(3)):
         r0, r1, r2 = table[row + a, 0], table[row + a, 1], table[row + a, 2]
         c = table[row + U(3), a]
-        for l in range(LANES):
+        for l in range(POINTS_PER_BATCH):
             s[to + U(32) * a + l] = (
                 r0 * s[source + l] + r1 * s[source + U(32) + l] + r2 * s[source + U(64) + l] + c
             )
@@ -141,13 +143,13 @@ def _stage(s, share, table, moment, bent_outer, bent_inner, newton_steps):
     if bent_inner:
         for _ in range(newton_steps):
             _follow(s, _INNER, _V, table, moment + U(10))
-        for l in range(LANES):
+        for l in range(POINTS_PER_BATCH):
             s[_LOST + l] = max(s[_LOST + l], s[_LEFT + l])
         _straightened_inverse(s, _INNER, table, moment + U(10), _G)
         for a in range(U(3)):
             for b in range(U(3)):
                 r0, r1, r2 = table[moment, b], table[moment + U(1), b], table[moment + U(2), b]
-                for l in range(LANES):
+                for l in range(POINTS_PER_BATCH):
                     at = _G + U(96) * a + l
                     s[_DXI + U(32) * (U(3) * a + b) + l] = (
                         s[at] * r0 + s[at + U(32)] * r1 + s[at + U(64)] * r2
@@ -158,12 +160,12 @@ def _stage(s, share, table, moment, bent_outer, bent_inner, newton_steps):
         for a in range(U(3)):
             for b in range(U(3)):
                 value = table[moment + a, b]
-                for l in range(LANES):
+                for l in range(POINTS_PER_BATCH):
                     s[_DXI + U(32) * (U(3) * a + b) + l] = value
     if bent_outer:
         for _ in range(newton_steps):
             _follow(s, _OUTER, _X, table, U(10))
-        for l in range(LANES):
+        for l in range(POINTS_PER_BATCH):
             s[_LOST + l] = max(s[_LOST + l], s[_LEFT + l])
         _straightened_inverse(s, _OUTER, table, U(10), _DZ)
     else:
@@ -172,13 +174,13 @@ def _stage(s, share, table, moment, bent_outer, bent_inner, newton_steps):
         for a in range(U(3)):
             for b in range(U(3)):
                 value = f32(1.0) if a == b else f32(0.0)
-                for l in range(LANES):
+                for l in range(POINTS_PER_BATCH):
                     s[_DZ + U(32) * (U(3) * a + b) + l] = value
     _affine(s, _X, _V, table, moment + U(4))
     for a in range(U(3)):
         for b in range(U(3)):
             value = table[moment + U(4) + a, b]
-            for l in range(LANES):
+            for l in range(POINTS_PER_BATCH):
                 s[_G + U(32) * (U(3) * a + b) + l] = value
     if bent_inner:
         _add_bend(s, table, moment + U(20))
@@ -194,7 +196,7 @@ def _add_bend(s, table, rows):
         w1 = table[rows + a, 0] * k[1, 0] + table[rows + a, 1] * k[1, 1] + table[rows + a, 2] * k[1, 2]
         w2 = table[rows + a, 0] * k[2, 0] + table[rows + a, 1] * k[2, 1] + table[rows + a, 2] * k[2, 2]
         w3 = table[rows + a, 0] * k[3, 0] + table[rows + a, 1] * k[3, 1] + table[rows + a, 2] * k[3, 2]
-        for l in range(LANES):
+        for l in range(POINTS_PER_BATCH):
             x, y, z = s[_INNER + l], s[_INNER + U(32) + l], s[_INNER + U(64) + l]
             cx, cy, cz = (
                 min(max(x, -f32(1.0)), f32(1.0)),
@@ -220,12 +222,16 @@ def _slopes(s, share, weight, kept, table, moment):
     h0, h1, h2 = table[moment + U(8), 0], table[moment + U(8), 1], table[moment + U(8), 2]
     per_width, end, middle = table[8, 2], table[9, 0], table[9, 2]
     last = f32(1.0) - end - middle
-    for l in range(LANES):
+    for l in range(POINTS_PER_BATCH):
         z0, z1, z2 = s[_OUTER + l], s[_OUTER + U(32) + l], s[_OUTER + U(64) + l]
         x0, x1, x2 = s[_INNER + l], s[_INNER + U(32) + l], s[_INNER + U(64) + l]
         f0, f1, f2 = H0 * (f32(1.0) - z0 * z0), H1 * (f32(1.0) - z1 * z1), H2 * (f32(1.0) - z2 * z2)
-        moves = f32(1.0) if min(f0, f1, f2) > AT_REST else f32(0.0)
-        i0, i1, i2 = f32(1.0) / max(f0, AT_REST), f32(1.0) / max(f1, AT_REST), f32(1.0) / max(f2, AT_REST)
+        moves = f32(1.0) if min(f0, f1, f2) > MIN_FACE_SHARE else f32(0.0)
+        i0, i1, i2 = (
+            f32(1.0) / max(f0, MIN_FACE_SHARE),
+            f32(1.0) / max(f1, MIN_FACE_SHARE),
+            f32(1.0) / max(f2, MIN_FACE_SHARE),
+        )
         e0, e1, e2 = (
             h0 * max(abs(x0) - f32(1.0), f32(0.0)),
             h1 * max(abs(x1) - f32(1.0), f32(0.0)),
@@ -274,7 +280,7 @@ def _slopes(s, share, weight, kept, table, moment):
         s[_G + U(256) + l] = w * s[_G + U(256) + l] + V2 * d2
     for b in range(U(3)):
         at = U(32) * b
-        for l in range(LANES):
+        for l in range(POINTS_PER_BATCH):
             y0 = s[_D + at + l] + share * s[_M + at + l]
             y1 = s[_D + U(96) + at + l] + share * s[_M + U(96) + at + l]
             y2 = s[_D + U(192) + at + l] + share * s[_M + U(192) + at + l]
@@ -357,7 +363,7 @@ def _rows(u0, u1, u2, v0, v1, v2, w0, w1, w2):
 @njit(**FAST)
 def _straightened_inverse(s, xi, table, K, to):
     """Writes (dy/dxi)^-1 [3,3], by rows, at the coordinates in the rows `xi`."""
-    for l in range(LANES):
+    for l in range(POINTS_PER_BATCH):
         x, y, z = s[xi + l], s[xi + U(32) + l], s[xi + U(64) + l]
         u0, u1, u2, v0, v1, v2, w0, w1, w2 = _columns(x, y, z, table, K)
         r = _rows(u0, u1, u2, v0, v1, v2, w0, w1, w2)
@@ -370,7 +376,7 @@ def _straightened_inverse(s, xi, table, K, to):
 def _follow(s, xi, target, table, K):
     """One of Newton's steps of the coordinates in the rows `xi` towards y(xi) = those in `target`."""
     k = table[K : K + U(10)]
-    for l in range(LANES):
+    for l in range(POINTS_PER_BATCH):
         x, y, z = s[xi + l], s[xi + U(32) + l], s[xi + U(64) + l]
         cx, cy, cz = (
             min(max(x, -f32(1.0)), f32(1.0)),

@@ -8,20 +8,20 @@ from cagefield.warps.flow_table import HEADER, MOMENT
 from cagefield.warps.kernels.flow_shell import flow_point
 from cagefield.warps.kernels.flow_velocity_simd import bend, inverse, newton, newton_twice, times, weight_at
 
-LANES = 64
-lanes = qd.types.vector(LANES, qd.f32)
+NODES_PER_BATCH = 64
+lanes = qd.types.vector(NODES_PER_BATCH, qd.f32)
 vec3 = qd.math.vec3
 mat3 = qd.types.matrix(3, 3, qd.f32)
 Nodes = qd.types.ndarray(dtype=vec3, ndim=1)
 Numbers = qd.types.ndarray(dtype=qd.i32, ndim=1)
 
-START_STEPS = 5
+START_LATTICE_NEWTON_STEPS = 5
 """Newton's steps for the outer cage's coordinates at the start of a way."""
 
 LOST = 1e30
 """Written to nodes whose coordinates were not followed."""
 
-AT_REST = 1.0 - 3e-6
+MAX_MOVING_COORDINATE = 1.0 - 3e-6
 """Nodes farther out than this, in coordinates of the outer cage, stay: those on its faces, after rounding.
 
 `kernels.flow_velocity_simd.NEAR` would let them drift.
@@ -57,7 +57,7 @@ def march(
     count = nodes.shape[0]
     for turn in range(turn_count(deal)):
         block = scheduled_item(turn, deal)
-        if block * LANES < count:
+        if block * NODES_PER_BATCH < count:
             # z, its rate k and the weighted sum of rates s; xi; the largest residual of xi; 1 where z is at
             # rest.
             zx = lanes(0.0)
@@ -74,8 +74,11 @@ def march(
             bz = lanes(0.0)
             lost = lanes(0.0)
             still = lanes(0.0)
-            for lane in range(LANES):
-                p = place(qd.min(block * LANES + lane, count - 1), origin, frame, resolution) - table[3]
+            for lane in range(NODES_PER_BATCH):
+                p = (
+                    place(qd.min(block * NODES_PER_BATCH + lane, count - 1), origin, frame, resolution)
+                    - table[3]
+                )
                 Zx, Zy, Zz = times(table, 0, p.x, p.y, p.z)
                 x = Zx
                 y = Zy
@@ -84,12 +87,12 @@ def march(
                     x = qd.max(qd.min(Zx, 1.0), -1.0)
                     y = qd.max(qd.min(Zy, 1.0), -1.0)
                     z = qd.max(qd.min(Zz, 1.0), -1.0)
-                    for _ in qd.static(range(START_STEPS)):
+                    for _ in qd.static(range(START_LATTICE_NEWTON_STEPS)):
                         x, y, z, lost[lane] = newton(x, y, z, Zx, Zy, Zz, table, 10)
                 zx[lane] = x
                 zy[lane] = y
                 zz[lane] = z
-                if qd.max(qd.abs(x), qd.abs(y), qd.abs(z)) > AT_REST:
+                if qd.max(qd.abs(x), qd.abs(y), qd.abs(z)) > MAX_MOVING_COORDINATE:
                     still[lane] = 1.0
                 if qd.static(bent_inner):
                     ix, iy, iz = times(table, HEADER, Zx, Zy, Zz)
@@ -99,7 +102,7 @@ def march(
                     x = ix
                     y = iy
                     z = iz
-                    for _ in qd.static(range(START_STEPS)):
+                    for _ in qd.static(range(START_LATTICE_NEWTON_STEPS)):
                         x, y, z, _r = newton(x, y, z, ix, iy, iz, table, HEADER + 10)
                     bx[lane] = x
                     by[lane] = y
@@ -117,7 +120,7 @@ def march(
                     kept = 0.0 if stage == 0 else 1.0
                     weight = 2.0 if (stage == 1 or stage == 2) else 1.0
                     moment = start + ((stage + 1) // 2) * MOMENT
-                    for lane in range(LANES):
+                    for lane in range(NODES_PER_BATCH):
                         x = zx[lane] + share * kx[lane]
                         y = zy[lane] + share * ky[lane]
                         z = zz[lane] + share * kz[lane]
@@ -171,12 +174,12 @@ def march(
                         sx[lane] = kept * sx[lane] + weight * vx
                         sy[lane] = kept * sy[lane] + weight * vy
                         sz[lane] = kept * sz[lane] + weight * vz
-                for lane in range(LANES):
+                for lane in range(NODES_PER_BATCH):
                     zx[lane] += (h / 6.0) * sx[lane]
                     zy[lane] += (h / 6.0) * sy[lane]
                     zz[lane] += (h / 6.0) * sz[lane]
-            for lane in range(LANES):
-                n = block * LANES + lane
+            for lane in range(NODES_PER_BATCH):
+                n = block * NODES_PER_BATCH + lane
                 if n < count:
                     p = place(n, origin, frame, resolution) - table[3]
                     x = zx[lane]

@@ -9,7 +9,7 @@ tables are those of `flow_table`; the same mathematics for one sample, in vector
 
 from cagefield.compute.quadrants import qd
 
-NEAR = 2e-5
+MIN_FACE_SHARE = 2e-5
 """Distances to the outer cage's faces, as shares of its half-width, are taken to be no less than this.
 
 Its eighth power, at the outer cage's edges, is still a normal float32.
@@ -23,9 +23,9 @@ def weight_at(
     """w at coordinates z of the outer and xi of the inner cage: 1 / (1 + d_i / d_o) in one division."""
     H = table[7]
     height = table[moment + 8]
-    dx = qd.max(H.x * (1.0 - x * x), NEAR)
-    dy = qd.max(H.y * (1.0 - y * y), NEAR)
-    dz = qd.max(H.z * (1.0 - z * z), NEAR)
+    dx = qd.max(H.x * (1.0 - x * x), MIN_FACE_SHARE)
+    dy = qd.max(H.y * (1.0 - y * y), MIN_FACE_SHARE)
+    dz = qd.max(H.z * (1.0 - z * z), MIN_FACE_SHARE)
     ex = height.x * qd.max(qd.abs(ix) - 1.0, 0.0)
     ey = height.y * qd.max(qd.abs(iy) - 1.0, 0.0)
     ez = height.z * qd.max(qd.abs(iz) - 1.0, 0.0)

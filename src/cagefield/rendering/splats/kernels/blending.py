@@ -22,7 +22,7 @@ import numpy as np
 from numba import prange
 
 from cagefield.compute.numba_cache import FAST, njit
-from cagefield.rendering.splats.kernels.projection import ALPHA_MAX, ALPHA_MIN, AREA, TILE
+from cagefield.rendering.splats.kernels.projection import ALPHA_MAX, ALPHA_MIN, AREA, TILE_PX
 
 F, U = np.float32, np.uint64
 LEAST, MOST = F(ALPHA_MIN), F(ALPHA_MAX)
@@ -60,15 +60,15 @@ def rows_of(p, y0):
     """The pixels of a tile, first and end, in the rows that a packed splat reaches."""
     low = int(np.ceil(p[1] - p[9])) - y0
     high = int(np.floor(p[1] + p[9])) + 1 - y0
-    return U(max(0, low) * TILE), U(max(0, min(TILE, high)) * TILE)
+    return U(max(0, low) * TILE_PX), U(max(0, min(TILE_PX, high)) * TILE_PX)
 
 
 @njit(inline="always", **FAST)
 def coordinates(state):
     """Writes the pixels' coordinates into a tile's state."""
     for i in range(AREA):
-        state[X + U(i)] = F(i % TILE)
-        state[Y + U(i)] = F(i // TILE)
+        state[X + U(i)] = F(i % TILE_PX)
+        state[Y + U(i)] = F(i // TILE_PX)
 
 
 @njit(**FAST)
@@ -152,7 +152,7 @@ def blend(packed, ids, starts, across, channels, stops, out):
     for t in prange(starts.size - 1):
         state = np.empty(ROWS * AREA, nb.float32)
         coordinates(state)
-        x0, y0 = (t % across) * TILE, (t // across) * TILE
+        x0, y0 = (t % across) * TILE_PX, (t // across) * TILE_PX
         stop = blend_tile(state, packed, ids, starts[t], starts[t + 1], x0, y0, channels > 4)
         stops[t] = stop
         for ch in range(min(channels, 5)):
@@ -267,38 +267,40 @@ def gradient_tile(state, packed, ids, begin, end, x0, y0, sums):
 
 
 @njit(parallel=True, **FAST)
-def gradients(packed, ids, starts, stops, width, height, colour, slopes, weights, empty, veil, sums):
+def gradients(packed, ids, starts, stops, width, height, color, slopes, weights, empty, veil, sums):
     """The sums of all pairs [pairs, SUMS]: colour [tiles,3,AREA] is the picture, slopes dL/d(picture).
 
     `weights` [tiles,AREA] scale the slopes; pixels of weight 0 count for nothing, nor does their curvature.
     `empty` [2,h,w], of the picture's shape but maybe smaller, are distances along its rays up to which there
     is nothing, and how sure that is; each alpha of a splat before them costs that times `veil`.
     """
-    across = (width + TILE - 1) // TILE
+    across = (width + TILE_PX - 1) // TILE_PX
     for t in prange(starts.size - 1):
         state = np.empty(ROWS * AREA, nb.float32)
         coordinates(state)
-        x0, y0 = (t % across) * TILE, (t // across) * TILE
+        x0, y0 = (t % across) * TILE_PX, (t // across) * TILE_PX
         for i in range(AREA):
             # Pixels outside the picture let nothing through, so that nothing there counts.
             weight = weights[t, i]
-            inside = ONE if x0 + i % TILE < width and y0 + i // TILE < height and weight > ZERO else ZERO
+            inside = (
+                ONE if x0 + i % TILE_PX < width and y0 + i // TILE_PX < height and weight > ZERO else ZERO
+            )
             state[i] = inside
             state[7 * AREA + i] = ZERO
-            row = min((y0 + i // TILE) * empty.shape[1] // height, empty.shape[1] - 1)
-            column = min((x0 + i % TILE) * empty.shape[2] // width, empty.shape[2] - 1)
+            row = min((y0 + i // TILE_PX) * empty.shape[1] // height, empty.shape[1] - 1)
+            column = min((x0 + i % TILE_PX) * empty.shape[2] // width, empty.shape[2] - 1)
             state[10 * AREA + i] = inside * empty[0, row, column]
             state[11 * AREA + i] = veil * empty[1, row, column]
             for ch in range(3):
                 state[(1 + ch) * AREA + i] = inside * weight * slopes[t, ch, i]
-                state[(4 + ch) * AREA + i] = inside * colour[t, ch, i]
+                state[(4 + ch) * AREA + i] = inside * color[t, ch, i]
         influence_tile(state, packed, ids, starts[t], stops[t], x0, y0)
         for i in range(AREA):
-            kept = x0 + i % TILE < width and y0 + i // TILE < height and weights[t, i] > ZERO
+            kept = x0 + i % TILE_PX < width and y0 + i // TILE_PX < height and weights[t, i] > ZERO
             inside = ONE if kept else ZERO
             state[i] = inside
             for ch in range(3):
-                state[(4 + ch) * AREA + i] = inside * colour[t, ch, i]
+                state[(4 + ch) * AREA + i] = inside * color[t, ch, i]
         gradient_tile(state, packed, ids, starts[t], stops[t], x0, y0, sums)
         for e in range(stops[t], starts[t + 1]):
             for j in range(SUMS):
@@ -310,7 +312,7 @@ def opacity_before(packed, ids, starts, across, pixels, distances, out):
     """Opacity [K] that rays through pixels [K,2] (x, y, centres at .5) have gathered before distances [K]."""
     for n in prange(pixels.shape[0]):
         x, y = pixels[n, 0] - HALF, pixels[n, 1] - HALF
-        t = int(pixels[n, 1]) // TILE * across + int(pixels[n, 0]) // TILE
+        t = int(pixels[n, 1]) // TILE_PX * across + int(pixels[n, 0]) // TILE_PX
         through = ONE
         for e in range(starts[t], starts[t + 1]):
             p = packed[ids[e]]

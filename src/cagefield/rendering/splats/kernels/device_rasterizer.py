@@ -21,13 +21,13 @@ from cagefield.rendering.splats.kernels.projection import (
     OPENCV,
     PACKED,
     SLOPE_BLUR,
-    TILE,
+    TILE_PX,
 )
 from cagefield.rendering.voxels.kernels.grid import F32, I32, sh_basis, vec3
 
 T_MIN = float(blending.T_MIN)
 
-MOST_VARIANCE = 1e15
+MAX_VARIANCE_PX2 = 1e15
 """Splats of larger variances, in pixels^2, are not drawn: their determinant would overflow."""
 
 vec2 = qd.types.vector(2, qd.f32)
@@ -80,7 +80,7 @@ def project(
     origin: vec3,
     origin_rest: vec3,
     focal: vec2,
-    centre: vec2,
+    center: vec2,
     size: ivec2,
     limits: vec4,
     coefficients: vec6,
@@ -96,8 +96,8 @@ def project(
     model: qd.template(),
 ):
     """As `splat_projection.project`; the camera is at origin + origin_rest, for float32 to hold it."""
-    across = (size.x + TILE - 1) // TILE
-    down = (size.y + TILE - 1) // TILE
+    across = (size.x + TILE_PX - 1) // TILE_PX
+    down = (size.y + TILE_PX - 1) // TILE_PX
     qd.loop_config(block_dim=128)
     for i in range(count):
         offset = vec3(means[3 * i], means[3 * i + 1], means[3 * i + 2]) - origin - origin_rest
@@ -129,7 +129,7 @@ def project(
                 a = v0.dot(M0)
                 b = v0.dot(M1)
                 c = v1.dot(M1)
-                if a + c < MOST_VARIANCE:
+                if a + c < MAX_VARIANCE_PX2:
                     # Rounded covariances may be indefinite.
                     sharp = qd.max(0.0, a * c - b * b)
                     det = sharp + BLUR * (a + c + BLUR)
@@ -138,16 +138,16 @@ def project(
                         o *= qd.max(LEAST_COMPENSATION, qd.sqrt(sharp / det))
                     reach = 2.0 * qd.log(o / ALPHA_MIN)
                     seen = distort(n.x, n.y, coefficients, model)
-                    u = focal.x * seen[0] + centre.x
-                    v = focal.y * seen[1] + centre.y
+                    u = focal.x * seen[0] + center.x
+                    v = focal.y * seen[1] + center.y
                     rx = qd.sqrt(qd.max(reach, 0.0) * (a + BLUR))
                     ry = qd.sqrt(qd.max(reach, 0.0) * (c + BLUR))
                     inside = u + rx > 0.0 and v + ry > 0.0 and u - rx < size.x and v - ry < size.y
                     if reach > 0.0 and inside:
-                        tiles[4 * i] = qd.cast(qd.max(0.0, (u - rx) / TILE), qd.i32)
-                        tiles[4 * i + 1] = qd.cast(qd.min(across - 1.0, (u + rx) / TILE), qd.i32) + 1
-                        tiles[4 * i + 2] = qd.cast(qd.max(0.0, (v - ry) / TILE), qd.i32)
-                        tiles[4 * i + 3] = qd.cast(qd.min(down - 1.0, (v + ry) / TILE), qd.i32) + 1
+                        tiles[4 * i] = qd.cast(qd.max(0.0, (u - rx) / TILE_PX), qd.i32)
+                        tiles[4 * i + 1] = qd.cast(qd.min(across - 1.0, (u + rx) / TILE_PX), qd.i32) + 1
+                        tiles[4 * i + 2] = qd.cast(qd.max(0.0, (v - ry) / TILE_PX), qd.i32)
+                        tiles[4 * i + 3] = qd.cast(qd.min(down - 1.0, (v + ry) / TILE_PX), qd.i32) + 1
                         row = PACKED * i
                         packed[row] = u - 0.5
                         packed[row + 1] = v - 0.5
@@ -180,20 +180,20 @@ def project(
                             e = back
                         basis = sh_basis(e, K)
                         for channel in qd.static(range(3)):
-                            colour = 0.5
+                            color = 0.5
                             for j in qd.static(range(K)):
-                                colour += basis[j] * sh[(i * K + j) * 3 + channel]
-                            packed[row + 6 + channel] = qd.max(0.0, colour)
+                                color += basis[j] * sh[(i * K + j) * 3 + channel]
+                            packed[row + 6 + channel] = qd.max(0.0, color)
 
 
 @qd.func
 def overlaps(packed: qd.template(), i: qd.i32, column: qd.i32, line: qd.i32):
     """1 where alpha exceeds ALPHA_MIN at some point of a tile; see `splat_tiles.overlaps`."""
     row = PACKED * i
-    x0 = column * TILE - packed[row]
-    y0 = line * TILE - packed[row + 1]
-    x1 = x0 + (TILE - 1)
-    y1 = y0 + (TILE - 1)
+    x0 = column * TILE_PX - packed[row]
+    y0 = line * TILE_PX - packed[row + 1]
+    x1 = x0 + (TILE_PX - 1)
+    y1 = y0 + (TILE_PX - 1)
     A = packed[row + 2]
     k = packed[row + 3]
     D = packed[row + 4]
@@ -254,8 +254,8 @@ def blend(
     for n in range(count * AREA):
         t = n // AREA
         pixel = n % AREA
-        x = qd.cast((t % across) * TILE + pixel % TILE, qd.f32)
-        y = qd.cast((t // across) * TILE + pixel // TILE, qd.f32)
+        x = qd.cast((t % across) * TILE_PX + pixel % TILE_PX, qd.f32)
+        y = qd.cast((t // across) * TILE_PX + pixel // TILE_PX, qd.f32)
         T = 1.0
         rgb = vec3(0.0, 0.0, 0.0)
         normal = vec3(0.0, 0.0, 0.0)
@@ -304,8 +304,8 @@ def opacity_before(
     for n in range(number):
         x = pixels[2 * n] - 0.5
         y = pixels[2 * n + 1] - 0.5
-        column = qd.cast(pixels[2 * n], qd.i32) // TILE
-        t = qd.cast(pixels[2 * n + 1], qd.i32) // TILE * across + column
+        column = qd.cast(pixels[2 * n], qd.i32) // TILE_PX
+        t = qd.cast(pixels[2 * n + 1], qd.i32) // TILE_PX * across + column
         T = 1.0
         for e in range(starts[t], starts[t + 1]):
             row = PACKED * ids[e]

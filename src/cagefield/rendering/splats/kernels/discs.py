@@ -48,7 +48,7 @@ from cagefield.rendering.splats.kernels.blending import (
 from cagefield.rendering.splats.kernels.projection import (
     ALPHA_MIN,
     MAX_TERMS,
-    TILE,
+    TILE_PX,
     clamped,
     distort,
     harmonics_at,
@@ -81,7 +81,7 @@ def project(
     W,
     origin,
     focal,
-    centre,
+    center,
     size,
     limits,
     model,
@@ -99,8 +99,8 @@ def project(
     the
     world. The rest as `splat_projection.project`.
     """
-    across = (size[0] + TILE - 1) // TILE
-    down = (size[1] + TILE - 1) // TILE
+    across = (size[0] + TILE_PX - 1) // TILE_PX
+    down = (size[1] + TILE_PX - 1) // TILE_PX
     terms = sh.shape[1]
     for i in prange(means.shape[0]):
         tiles[i, 0] = 0
@@ -146,8 +146,8 @@ def project(
         A = max(ux * ux + vx * vx, 1e-20)
         turn = ux * vy - uy * vx
         xd, yd, _, _, _, _ = distort(x / z, y / z, model, coefficients)
-        u = focal[0] * xd + centre[0]
-        v = focal[1] * yd + centre[1]
+        u = focal[0] * xd + center[0]
+        v = focal[1] * yd + center[1]
         reach = 2.0 * np.log(o / ALPHA_MIN)
         dot = np.sqrt(2.0 * FILTER * reach)
         left, right, top, bottom = u - dot, u + dot, v - dot, v + dot
@@ -165,10 +165,10 @@ def project(
             top, bottom = min(top, my - ry), max(bottom, my + ry)
         if not (right > 0.0 and bottom > 0.0 and left < size[0] and top < size[1]):
             continue
-        tiles[i, 0] = int(max(0.0, left / TILE))
-        tiles[i, 1] = int(min(across - 1.0, right / TILE)) + 1
-        tiles[i, 2] = int(max(0.0, top / TILE))
-        tiles[i, 3] = int(min(down - 1.0, bottom / TILE)) + 1
+        tiles[i, 0] = int(max(0.0, left / TILE_PX))
+        tiles[i, 1] = int(min(across - 1.0, right / TILE_PX)) + 1
+        tiles[i, 2] = int(max(0.0, top / TILE_PX))
+        tiles[i, 3] = int(min(down - 1.0, bottom / TILE_PX)) + 1
         row = packed[i]
         row[0] = u - 0.5
         row[1] = v - 0.5
@@ -196,10 +196,10 @@ def project(
         basis = np.empty(MAX_TERMS)
         harmonics_at(ex, ey, ez, terms, basis)
         for ch in range(3):
-            colour = 0.5
+            color = 0.5
             for j in range(terms):
-                colour += basis[j] * sh[i, j, ch]
-            row[6 + ch] = max(0.0, colour)
+                color += basis[j] * sh[i, j, ch]
+            row[6 + ch] = max(0.0, color)
 
 
 @njit(inline="always", **FAST)
@@ -272,7 +272,7 @@ def blend(packed, ids, starts, across, near, channels, out):
     for t in prange(starts.size - 1):
         state = np.empty(ROWS * AREA, nb.float32)
         coordinates(state)
-        x0, y0 = (t % across) * TILE, (t // across) * TILE
+        x0, y0 = (t % across) * TILE_PX, (t // across) * TILE_PX
         stop = blend_tile(state, packed, ids, starts[t], starts[t + 1], x0, y0, near)
         for ch in range(min(channels, 5)):
             for i in range(AREA):
@@ -289,7 +289,7 @@ def opacity_before(packed, ids, starts, across, near, pixels, depths, out):
     """Opacity [K] that rays through pixels [K,2] (x, y, centres at .5) have gathered before depths z [K]."""
     for n in prange(pixels.shape[0]):
         x, y = pixels[n, 0] - HALF, pixels[n, 1] - HALF
-        t = int(pixels[n, 1]) // TILE * across + int(pixels[n, 0]) // TILE
+        t = int(pixels[n, 1]) // TILE_PX * across + int(pixels[n, 0]) // TILE_PX
         through = ONE
         for e in range(starts[t], starts[t + 1]):
             p = packed[ids[e]]

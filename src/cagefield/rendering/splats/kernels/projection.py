@@ -23,8 +23,8 @@ from numba import prange
 from cagefield.compute.numba_cache import FAST, njit
 from cagefield.fields import sh as harmonics
 
-TILE = 16
-AREA = TILE * TILE
+TILE_PX = 16
+AREA = TILE_PX * TILE_PX
 BLUR = 0.3
 """Variance, in pixels^2, of the filter that every splat gets."""
 ALPHA_MIN = 1.0 / 255.0
@@ -49,7 +49,7 @@ SLOPE_BLUR = 0.02
 DEEPEST = 1.588625448
 """Li2(ALPHA_MAX): the optical depth, over 2 pi times its area, of the most opaque splat there is."""
 
-MOST_VARIANCE = 1e30
+MAX_WORLD_VARIANCE = 1e30
 """Splats of larger variances, in world units^2, are not drawn."""
 
 C0, C1 = harmonics.C0, harmonics.C1
@@ -160,7 +160,7 @@ def project(
     W,
     origin,
     focal,
-    centre,
+    center,
     size,
     limits,
     model,
@@ -182,8 +182,8 @@ def project(
     opacity the one whose Li2 is that depth over their own projected area. `depths` is the table of
     o (Li2) in equal steps of Li2 from 0 to Li2(ALPHA_MAX).
     """
-    across = (size[0] + TILE - 1) // TILE
-    down = (size[1] + TILE - 1) // TILE
+    across = (size[0] + TILE_PX - 1) // TILE_PX
+    down = (size[1] + TILE_PX - 1) // TILE_PX
     fx, fy = focal[0], focal[1]
     turned = rotations.shape[0] > 0
     with_normals = normals.shape[0] > 0
@@ -207,7 +207,7 @@ def project(
         M = np.empty((2, 3))
         jacobian(x, y, z, W, fx, fy, limits, model, coefficients, M)
         C = covariances[i]
-        if not C[0] + C[3] + C[5] < MOST_VARIANCE:
+        if not C[0] + C[3] + C[5] < MAX_WORLD_VARIANCE:
             continue
         v00 = M[0, 0] * C[0] + M[0, 1] * C[1] + M[0, 2] * C[2]
         v01 = M[0, 0] * C[1] + M[0, 1] * C[3] + M[0, 2] * C[4]
@@ -237,16 +237,16 @@ def project(
         a += BLUR
         c += BLUR
         xd, yd, _, _, _, _ = distort(x / z, y / z, model, coefficients)
-        u = fx * xd + centre[0]
-        v = fy * yd + centre[1]
+        u = fx * xd + center[0]
+        v = fy * yd + center[1]
         rx = np.sqrt(reach * a)
         ry = np.sqrt(reach * c)
         if not (u + rx > 0.0 and v + ry > 0.0 and u - rx < size[0] and v - ry < size[1]):
             continue
-        tiles[i, 0] = int(max(0.0, (u - rx) / TILE))
-        tiles[i, 1] = int(min(across - 1.0, (u + rx) / TILE)) + 1
-        tiles[i, 2] = int(max(0.0, (v - ry) / TILE))
-        tiles[i, 3] = int(min(down - 1.0, (v + ry) / TILE)) + 1
+        tiles[i, 0] = int(max(0.0, (u - rx) / TILE_PX))
+        tiles[i, 1] = int(min(across - 1.0, (u + rx) / TILE_PX)) + 1
+        tiles[i, 2] = int(max(0.0, (v - ry) / TILE_PX))
+        tiles[i, 3] = int(min(down - 1.0, (v + ry) / TILE_PX)) + 1
         row = packed[i]
         row[0] = u - 0.5
         row[1] = v - 0.5
@@ -276,7 +276,7 @@ def project(
         basis = np.empty(MAX_TERMS)
         harmonics_at(ex, ey, ez, terms, basis)
         for ch in range(3):
-            colour = 0.5
+            color = 0.5
             for j in range(terms):
-                colour += basis[j] * sh[i, j, ch]
-            row[6 + ch] = max(0.0, colour)
+                color += basis[j] * sh[i, j, ch]
+            row[6 + ch] = max(0.0, color)

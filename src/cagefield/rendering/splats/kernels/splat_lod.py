@@ -21,9 +21,9 @@ import numpy as np
 from numba import prange
 
 from cagefield.compute.numba_cache import FAST, njit
-from cagefield.rendering.splats.kernels.projection import ALPHA_MAX, ALPHA_MIN, MOST_VARIANCE
+from cagefield.rendering.splats.kernels.projection import ALPHA_MAX, ALPHA_MIN, MAX_WORLD_VARIANCE
 
-BOX = 7
+CLUSTER_FLOATS = 7
 """Floats of a cluster: 0-2 centre and 3-5 half-size of the box of its means, 6 the largest distance from its
 mean, in world units, at which one of its splats still shows."""
 
@@ -68,14 +68,14 @@ def codes(means, low, scale, out):
 
 @njit(parallel=True, **FAST)
 def boxes(means, covariances, opacities, order, size, out):
-    """Writes the boxes [clusters,BOX] of each `size` splats of `order`."""
+    """Writes the boxes [clusters,CLUSTER_FLOATS] of each `size` splats of `order`."""
     for k in prange(out.shape[0]):
         low, high = np.full(3, 1e30), np.full(3, -1e30)
         reach = 0.0
         for q in range(k * size, min((k + 1) * size, order.size)):
             i = order[q]
             C = covariances[i]
-            if opacities[i] <= ALPHA_MIN or not C[0] + C[3] + C[5] < MOST_VARIANCE:
+            if opacities[i] <= ALPHA_MIN or not C[0] + C[3] + C[5] < MAX_WORLD_VARIANCE:
                 continue
             for axis in range(3):
                 low[axis] = min(low[axis], np.float64(means[i, axis]))
@@ -161,7 +161,7 @@ def merge(
     turned = rotations.shape[0] > 0
     for g in prange(out_means.shape[0]):
         mean, C, spread, own = np.zeros(3), np.zeros(6), np.zeros(6), np.empty(6)
-        colour = np.zeros((terms, 3))
+        color = np.zeros((terms, 3))
         mass = count = most = 0.0
         heaviest = order[g * size]
         first = np.empty(3)
@@ -170,7 +170,7 @@ def merge(
         for q in range(g * size, min((g + 1) * size, order.size)):
             i = order[q]
             c = covariances[i]
-            if not c[0] + c[3] + c[5] < MOST_VARIANCE:
+            if not c[0] + c[3] + c[5] < MAX_WORLD_VARIANCE:
                 continue
             for j in range(6):
                 own[j] = c[j]
@@ -199,7 +199,7 @@ def merge(
                 C[j] += weight * c[j]
             for j in range(terms):
                 for ch in range(3):
-                    colour[j, ch] += weight * sh[i, j, ch]
+                    color[j, ch] += weight * sh[i, j, ch]
         inverse = 1.0 / max(mass, 1e-300)
         for j in range(3):
             mean[j] *= inverse
@@ -217,7 +217,7 @@ def merge(
         out_apart[g] = np.sqrt(max(0.0, apart))
         for j in range(terms):
             for ch in range(3):
-                out_sh[g, j, ch] = colour[j, ch] * inverse
+                out_sh[g, j, ch] = color[j, ch] * inverse
         out_masses[g, 0] = mass / area(C)
         out_masses[g, 1] = count
         if turned:

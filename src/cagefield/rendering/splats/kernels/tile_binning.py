@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cagefield.compute.numba_cache import FAST, njit
-from cagefield.rendering.splats.kernels.projection import ALPHA_MIN, TILE, clamped
+from cagefield.rendering.splats.kernels.projection import ALPHA_MIN, TILE_PX, clamped
 
 FILTER = 0.25
 """F, in pixels^2: a disc is never thinner on the picture than a dot of the variance 2 F (`splat_discs`)."""
@@ -14,10 +14,10 @@ FILTER = 0.25
 @njit(**FAST)
 def overlaps(p, across, down):
     """Whether alpha exceeds ALPHA_MIN at some point of a tile: the least of the quadratic form over it."""
-    x0 = np.float64(across * TILE) - p[0]
-    y0 = np.float64(down * TILE) - p[1]
-    x1 = x0 + (TILE - 1)
-    y1 = y0 + (TILE - 1)
+    x0 = np.float64(across * TILE_PX) - p[0]
+    y0 = np.float64(down * TILE_PX) - p[1]
+    x1 = x0 + (TILE_PX - 1)
+    y1 = y0 + (TILE_PX - 1)
     if x0 <= 0.0 and x1 >= 0.0 and y0 <= 0.0 and y1 >= 0.0:
         return True
     A, k, D = p[2], p[3], p[4]
@@ -41,10 +41,10 @@ def disc_overlaps(p, across, down):
     there; the dot by its radius.
     """
     reach = 2.0 * np.log(p[5] / ALPHA_MIN)
-    x0 = np.float64(across * TILE) - p[0]
-    y0 = np.float64(down * TILE) - p[1]
-    x1 = x0 + (TILE - 1)
-    y1 = y0 + (TILE - 1)
+    x0 = np.float64(across * TILE_PX) - p[0]
+    y0 = np.float64(down * TILE_PX) - p[1]
+    x1 = x0 + (TILE_PX - 1)
+    y1 = y0 + (TILE_PX - 1)
     nx, ny = clamped(0.0, x0, x1), clamped(0.0, y0, y1)
     if nx * nx + ny * ny <= 2.0 * FILTER * reach:
         return True

@@ -43,7 +43,7 @@ from cagefield.rendering.voxels.kernels.ray_grid import (
 
 mat3 = qd.types.matrix(3, 3, qd.f32)
 ivec2 = qd.types.vector(2, qd.i32)
-TILE = 8
+MARCH_TILE_PX = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,13 +105,13 @@ def march_tiles(
     may lie in them is found first; only its samples in occupied blocks evaluate the edits' maps. `bricks` are
     those of the deformed field, `canonical_bricks`, which begin at 0, those of the field as it was trained.
     """
-    across = (tiles.size.x + TILE - 1) // TILE
+    across = (tiles.size.x + MARCH_TILE_PX - 1) // MARCH_TILE_PX
     qd.loop_config(block_dim=64)
     for turn in range(turn_count(deal)):
         n = scheduled_item(turn, deal)
-        tile = n // (TILE * TILE)
-        x = (tile % across) * TILE + n % TILE
-        y = (tiles.first_row + tile // across) * TILE + (n // TILE) % TILE
+        tile = n // (MARCH_TILE_PX * MARCH_TILE_PX)
+        x = (tile % across) * MARCH_TILE_PX + n % MARCH_TILE_PX
+        y = (tiles.first_row + tile // across) * MARCH_TILE_PX + (n // MARCH_TILE_PX) % MARCH_TILE_PX
         if tile < across * tiles.rows and x < tiles.size.x and y < tiles.size.y:
             pixel = (tiles.corner.y + y) * camera.width + tiles.corner.x + x
             d = camera.rotation @ vec3(

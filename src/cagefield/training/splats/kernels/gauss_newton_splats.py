@@ -19,7 +19,7 @@ import numpy as np
 from numba import prange
 
 from cagefield.compute.numba_cache import FAST, njit
-from cagefield.rendering.splats.kernels.projection import AREA, MAX_TERMS, TILE, harmonics_at
+from cagefield.rendering.splats.kernels.projection import AREA, MAX_TERMS, TILE_PX, harmonics_at
 
 MOMENTUM_FLOATS, RUNNING_FLOATS = 13, 17
 """Floats of a splat's running gradient, and of its running curvature (the last is the sum of weights)."""
@@ -38,10 +38,10 @@ def residuals(out, target, width, height, gain, background, weights, color, slop
     [tiles, 7]: squared error; gain-free image x photo and image^2, by channel; all weighted by `weights`
     [tiles,AREA]. The slopes are unweighted.
     """
-    across = (width + TILE - 1) // TILE
+    across = (width + TILE_PX - 1) // TILE_PX
     alpha = target.shape[1] == 4
     for t in prange(out.shape[0]):
-        x0, y0 = (t % across) * TILE, (t // across) * TILE
+        x0, y0 = (t % across) * TILE_PX, (t // across) * TILE_PX
         for j in range(7):
             sums[t, j] = 0.0
         for ch in range(3):
@@ -49,7 +49,7 @@ def residuals(out, target, width, height, gain, background, weights, color, slop
             product = np.float32(0.0)
             square = np.float32(0.0)
             for i in range(AREA):
-                inside = x0 + i % TILE < width and y0 + i // TILE < height
+                inside = x0 + i % TILE_PX < width and y0 + i // TILE_PX < height
                 c = out[t, 1 + ch, i] + out[t, 0, i] * background[ch]
                 photo = np.float32(target[t, ch, i]) * np.float32(1 / 255)
                 if alpha:

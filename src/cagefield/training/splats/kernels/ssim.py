@@ -13,7 +13,7 @@ import numpy as np
 from numba import prange
 
 from cagefield.compute.numba_cache import FAST, njit
-from cagefield.rendering.splats.kernels.projection import TILE
+from cagefield.rendering.splats.kernels.projection import TILE_PX
 
 WINDOW_PIXELS = 11
 """Side of a window; its Gaussian has a standard deviation of 1.5."""
@@ -38,24 +38,24 @@ def add_ssim_gradient(
     background; gain and background [3]. Where `weights` [tiles,AREA] are 0 the photo counts as equal to the
     image. moments [3,MOMENT_PLANES,H,W], moment_slopes [3,3,H,W] and pixels [3,2,H,W] are scratch.
     """
-    across = (width + TILE - 1) // TILE
+    across = (width + TILE_PX - 1) // TILE_PX
     alpha = target.shape[1] == 4
     for row in prange(3 * height):
         ch, y = row // height, row % height
-        first = (y // TILE) * across
-        line = (y % TILE) * TILE
+        first = (y // TILE_PX) * across
+        line = (y % TILE_PX) * TILE_PX
         x = pixels[ch, 0, y]
         p = pixels[ch, 1, y]
         for tile in range(across):
-            for i in range(min(TILE, width - tile * TILE)):
+            for i in range(min(TILE_PX, width - tile * TILE_PX)):
                 at = line + i
                 photo = np.float32(target[first + tile, ch, at]) * np.float32(1 / 255)
                 if alpha:
                     share = np.float32(target[first + tile, 3, at]) * np.float32(1 / 255)
                     photo = photo * share + background[ch] * (np.float32(1) - share)
                 shown = gain[ch] * color[first + tile, ch, at]
-                x[tile * TILE + i] = shown
-                p[tile * TILE + i] = photo if weights[first + tile, at] > np.float32(0) else shown
+                x[tile * TILE_PX + i] = shown
+                p[tile * TILE_PX + i] = photo if weights[first + tile, at] > np.float32(0) else shown
         out = moments[ch, :, y]
         out[:] = np.float32(0)
         for k in range(WINDOW_PIXELS):
@@ -112,11 +112,11 @@ def add_ssim_gradient(
                 source = moment_slopes[ch, j, y + k - _HALF]
                 for i in range(width):
                     total[j, i] += w * source[i]
-        first = (y // TILE) * across
-        line = (y % TILE) * TILE
+        first = (y // TILE_PX) * across
+        line = (y % TILE_PX) * TILE_PX
         scale = np.float32(-0.5) * np.float32(weight) * gain[ch]
         for tile in range(across):
-            for i in range(min(TILE, width - tile * TILE)):
-                at = tile * TILE + i
+            for i in range(min(TILE_PX, width - tile * TILE_PX)):
+                at = tile * TILE_PX + i
                 g = total[0, at] + np.float32(2) * pixels[ch, 0, y, at] * total[1, at]
                 slopes[first + tile, ch, line + i] += scale * (g + pixels[ch, 1, y, at] * total[2, at])
