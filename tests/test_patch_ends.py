@@ -17,7 +17,7 @@ from cagefield.completion.lighting.shadow_strength import MAX_STRENGTH, MIN_STRE
 from cagefield.completion.surfaces.footprint import Footprint
 from cagefield.completion.surfaces.grid_block import extract_block
 from cagefield.completion.surfaces.support_plane import Support
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, PreparedStack
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.scene.scene import Scene
@@ -122,7 +122,7 @@ def test_what_a_lifted_part_hid_takes_the_colours_around() -> None:
     edit = Edit.continuous(INNER, OUTER, lattice=32).translate((0.0, 0.0, 0.35))
     light = relight_voxels(field, EditStack(), edit, strong)
     assert light is not None
-    block = extract_block(field, EditStack([light]), field.bounds)
+    block = extract_block(field, PreparedStack([light]), field.bounds)
     points = block.positions(np.ones(block.shape, bool)).reshape(*block.shape, 3)
     deep = (np.abs(points[..., :2] - [0.1, 0.0]) < 0.12).all(axis=-1) & (np.abs(points[..., 2] + 0.42) < 0.02)
     colors = block.mean_colors(deep & (block.slot >= 0))

@@ -132,7 +132,7 @@ def test_a_shadow_has_an_edge_on_splats_that_are_longer_than_that(
 
     def off() -> float:
         splitting.known_splits.clear()
-        shown = SplatRenderer(field).with_edits(EditStack([edit])).render(camera, background="black")
+        shown = SplatRenderer(field).with_edits(PreparedStack([edit])).render(camera, background="black")
         return db(shown.rgb, wanted)
 
     split = off()

@@ -225,6 +225,11 @@ def _of_kind(keys: dict[str, Node], inner: Cage, outer: Cage | None, options: di
     allow_folding = "allow_folding" in keys and keys["allow_folding"].boolean()
     name = options.get("name", "")
     try:
+        if source is not None and (adjustment == "continuous" or delete or not keep_source):
+            raise EditError(
+                "source is for copies: a paste is discrete and keeps its source; leave out adjustment,"
+                " keep_source and delete, or use Edit.paste"
+            )
         if adjustment == "continuous":
             if keep_source or delete:
                 raise EditError(f'{"deleted" if delete else "keep_source"} needs adjustment="discrete"')
@@ -233,11 +238,6 @@ def _of_kind(keys: dict[str, Node], inner: Cage, outer: Cage | None, options: di
             kind = _shell_kind(shell, falloff, "discrete edit", has_falloff=False)
         if delete and (options["operations"] or keep_source):
             raise EditError("a delete has no operations and keeps no source")
-        if source is not None and (adjustment == "continuous" or delete or not keep_source):
-            raise EditError(
-                "source is for copies: a paste is discrete and keeps its source; leave out adjustment,"
-                " keep_source and delete, or use Edit.paste"
-            )
     except EditError as error:
         raise EditError(f'edit "{name}": {error}' if name else f"edit: {error}") from None
     if adjustment == "continuous":
