@@ -167,12 +167,12 @@ def test_textures_grow_for_layers_up_to_the_memory(page: FieldPage) -> None:
     """Many edits, whose layers take more room than a field's textures have to spare."""
     field, seen = lumps(0, False), camera(False)
     cages = [Cage.box((x, y, 0.0), 0.3) for x in (-0.5, 0.5) for y in (-0.4, 0.4)]
-    edits = EditStack(
+    edits = PreparedStack(
         PreparedEdit(Edit.delete(cage), patch_by_hand(field, cage, part=False, margin=0.4, seed=n))
         for n, cage in enumerate(cages)
     )
     renderer = VoxelRenderer(field, edits)
-    content, few = encode_page_edits(renderer), encode_page_edits(VoxelRenderer(field, EditStack(edits[:1])))
+    content, few = encode_page_edits(renderer), encode_page_edits(VoxelRenderer(field, PreparedStack(edits[:1])))
     page.edit(None)
     bytes_before = page.load(encode_page_field(field))["bytes"]
     page.edit(few)
