@@ -1,11 +1,7 @@
 """An edit stack as the page's GPU evaluates it: numbers of the edits, their lattices, the deformed occupancy.
 
-    rows        [44 E + 2 B, 4] float32. Of each edit 8 rows, its numbers in `edits.device.packing`:
-                    box's min, first | box's max, last | lattice's origin, nodes an axis |
-                    to nodes, row 0, continuous | row 1, simple | row 2, under | node box's min, first node |
-                    max, part
-                and the hexahedra 0 and 1, 18 rows each: W (its first w is the affine flag), c, the box of y,
-                the bend [4,3], the image [8,3]. Then min and max of the boxes outside which nothing changes.
+    rows        [EDIT_ROWS E + 2 B, 4] float32, the numbers of each edit in `edits.device.packing`, in the
+                layout of `row_layout`. Then min and max of the boxes outside which nothing changes.
     lattice.N   [2, 3 R^3] uint8, low and high bytes of float16 displacements in world units, of lattice N
     layer.N.*   the arrays of layer N (`page_layers`), of those that the edits' patches have
     occupancy   [bx, by, bz] uint16, codes of the deformed field (`rendering.voxels.occupancy`), from
@@ -13,7 +9,7 @@
 
 Inner cages are exact. Shells are lattices: an edit whose shell is evaluated exactly gets one of LATTICE nodes
 an axis, and finer ones than FINEST_LATTICE are made that coarse. In the GPU's texture every lattice begins at
-a multiple of ROW_OF_NODES nodes, so that one can be uploaded without the others.
+a multiple of NODES_PER_TEXTURE_ROW nodes, so that one can be uploaded without the others.
 
 The header names lattices, layers and the occupancy by keys, digests of their content. A file for a page that
 has some of them already leaves those out; of an occupancy whose grid the page has, it holds the part that
@@ -31,9 +27,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.edits import Continuous, Edit, PreparedEdit, PreparedStack
-from cagefield.edits.device import packing as row_layout
+from cagefield.edits.device import packing
 from cagefield.edits.device_stack import DeviceStack
 from cagefield.errors import EditError
+from cagefield.pages import row_layout as layout
 from cagefield.pages.page_file import LEVEL, byte_planes, pack
 from cagefield.pages.page_layers import bricks_of, digest, encode_layer, layer_key
 from cagefield.rendering.voxels.occupancy import Occupancy
@@ -47,12 +44,6 @@ LATTICE = 64
 
 FINEST_LATTICE = 128
 """Most nodes an axis of a lattice: 12 MB of halves."""
-
-ROW_OF_NODES = 2048
-"""Nodes in a row of the lattices' texture: every WebGL2 has textures of as many texels an edge."""
-
-ROWS, MOST_ROWS = 44, 1024
-"""Rows of an edit, and those of the shader's 16 KiB of uniforms, which every WebGL2 has."""
 
 
 @dataclass(frozen=True)
@@ -131,19 +122,22 @@ def encode_changed_edits(
 
 
 def page_rows(edits: Sequence[PreparedEdit], stack: DeviceStack) -> Float32:
-    """The rows [ROWS E + 2 B, 4] of a stack's active edits, packed in `stack`. Raises EditError as above."""
+    """The rows [EDIT_ROWS E + 2 B, 4] of a stack's active edits, packed in `stack`.
+
+    Raises EditError as `encode_page_edits` does.
+    """
     boxes = stack.boxes if edits else np.zeros((0, 2, 3), np.float32)
-    if ROWS * len(edits) + 2 * len(boxes) > MOST_ROWS:
+    if layout.EDIT_ROWS * len(edits) + layout.BOX_ROWS * len(boxes) > layout.MAX_ROWS:
         raise EditError(
             f"{len(edits)} edits are more than a page's GPU takes; let the server draw, or bake some"
         )
     rows, first = [], 0
     for step, row in zip(edits, stack.params, strict=False):
         rows.append(_rows(step.edit, row, first))
-        if row[row_layout.CONTINUOUS] > 0.5:
-            nodes = round(float(row[row_layout.RESOLUTION])) ** 3
-            first += -(-nodes // ROW_OF_NODES) * ROW_OF_NODES
-    ends = np.zeros((2 * len(boxes), 4), np.float32)
+        if row[packing.CONTINUOUS] > 0.5:
+            nodes = round(float(row[packing.RESOLUTION])) ** 3
+            first += -(-nodes // layout.NODES_PER_TEXTURE_ROW) * layout.NODES_PER_TEXTURE_ROW
+    ends = np.zeros((layout.BOX_ROWS * len(boxes), 4), np.float32)
     ends[:, :3] = boxes.reshape(-1, 3)
     return np.concatenate([*rows, ends])
 
@@ -183,21 +177,42 @@ def _lattice_key(edit: Edit, nodes: Float32) -> str:
 
 
 def _rows(edit: Edit, row: NDArray[np.float32], first_node: int) -> Float32:
-    """The rows [ROWS,4] of an edit from its row of `edits.device.packing`, its lattice from a node on."""
-    p = row_layout
+    """The rows [EDIT_ROWS,4] of an edit: `row` is its row of `edits.device.packing`, `first_node` the first
+    node of its lattice.
+    """
+    p, at = packing, layout
     if row[p.CONTINUOUS] > 0.5 and row[p.RESOLUTION] < 1.0:
         raise EditError(f'edit "{edit.name}" has no lattice; a page draws shells from lattices (`for_pages`)')
-    out = np.zeros((ROWS, 4), np.float32)
-    out[0:2, :3] = row[p.BOX : p.BOX + 6].reshape(2, 3)
-    out[2:6, :3] = row[p.TO_NODES : p.TO_NODES + 12].reshape(4, 3)
-    out[6:8, :3] = row[p.NODE_BOX : p.NODE_BOX + 6].reshape(2, 3)
-    out[:8, 3] = (
-        row[p.FIRST], row[p.LAST], row[p.RESOLUTION], row[p.CONTINUOUS], row[p.SIMPLE], row[p.UNDER],
-        first_node, row[p.PART],
-    )  # fmt: skip
+    out = np.zeros((at.EDIT_ROWS, 4), np.float32)
+    for first, column, count in (
+        (at.BOX_VECTOR, p.BOX, 2),
+        (at.LATTICE_VECTOR, p.TO_NODES, 1),
+        (at.TO_NODES_VECTOR, p.TO_NODES + 3, 3),
+        (at.NODE_BOX_VECTOR, p.NODE_BOX, 2),
+    ):
+        out[first : first + count, :3] = row[column : column + 3 * count].reshape(count, 3)
+    for scalar, value in (
+        (at.FIRST_SCALAR, row[p.FIRST]),
+        (at.LAST_SCALAR, row[p.LAST]),
+        (at.RESOLUTION_SCALAR, row[p.RESOLUTION]),
+        (at.CONTINUOUS_SCALAR, row[p.CONTINUOUS]),
+        (at.SIMPLE_SCALAR, row[p.SIMPLE]),
+        (at.UNDER_SCALAR, row[p.UNDER]),
+        (at.NODE_SCALAR, first_node),
+        (at.PART_SCALAR, row[p.PART]),
+    ):
+        out[scalar, 3] = value
     for number in range(2):
         record = row[p.RECORDS + number * p.RECORD : p.RECORDS + (number + 1) * p.RECORD]
-        at = 8 + 18 * number
-        out[at : at + 18, :3] = record[p.MATRIX : p.RECORD].reshape(18, 3)
-        out[at, 3] = record[p.AFFINE]
+        first = at.HEXAHEDRON + number * at.HEXAHEDRON_ROWS
+        for vector, column, count in (
+            (at.MATRIX_VECTOR, p.MATRIX, 3),
+            (at.CENTER_VECTOR, p.CENTER, 1),
+            (at.Y_BOX_VECTOR, p.LOW, 2),
+            (at.BEND_VECTOR, p.BEND, 4),
+            (at.IMAGE_VECTOR, p.IMAGE, 8),
+        ):
+            vectors = record[column : column + 3 * count].reshape(count, 3)
+            out[first + vector : first + vector + count, :3] = vectors
+        out[first + at.AFFINE_SCALAR, 3] = record[p.AFFINE]
     return out

@@ -1,18 +1,15 @@
 /**
  * The maps of an edit stack for one sample, as `cagefield.edits.device.kernels.edit_maps` has them.
  *
- * `rows` is the page's layout (see `cagefield.pages.page_edits`): for each edit 8 numbers of four, and two
- * hexahedra of 18. Shells come from lattices of halves, interpolated by hand: the GPU's own weights have 8 bits.
+ * `rows` has the layout of `cagefield.pages.row_layout`. Shells come from lattices of float16, interpolated by the
+ * shader: the weights of the GPU's own interpolation have 8 bits.
  */
-export const ROW = 44;
-export const MOST_ROWS = 1024;
-/** Nodes of lattices in a row of their texture. */
-export const LATTICE_WIDTH = 2048;
+import { defines } from "./gl";
+import { EDIT_LAYOUT } from "./layout";
 
 const SOURCE = `
-#define ROW ${ROW}
-#define EDGE 1e-6
-layout(std140) uniform Edits { vec4 rows[${MOST_ROWS}]; };
+${defines(EDIT_LAYOUT)}
+layout(std140) uniform Edits { vec4 rows[MAX_ROWS]; };
 uniform sampler2D lattice;
 uniform int editCount;
 uniform int boxCount;
@@ -51,19 +48,19 @@ vec3 bent(int at, vec3 xi) {
 
 // Coordinates in the hexahedron at a row, clamped to [-1,1]^3, and how far off that is.
 vec3 hexahedron(vec3 p, int at, out float error) {
-  vec3 y = times(at, p - rows[at + 3].xyz);
+  vec3 y = times(at + MATRIX_VECTOR, p - rows[at + CENTER_VECTOR].xyz);
   vec3 xi = y;
   error = 0.0;
-  if (rows[at].w < 0.5) {
-    if (inBox(y, rows[at + 4].xyz, rows[at + 5].xyz)) {
+  if (rows[at + AFFINE_SCALAR].w < 0.5) {
+    if (inBox(y, rows[at + Y_BOX_VECTOR].xyz, rows[at + Y_BOX_VECTOR + 1].xyz)) {
       xi = clamp(y, -1.0, 1.0);
       for (int n = 0; n < 16; n++) {
-        vec3 next = clamp(xi - bendSolve(at + 6, xi, bent(at + 6, xi) - y), -1.4, 1.4);
+        vec3 next = clamp(xi - bendSolve(at + BEND_VECTOR, xi, bent(at + BEND_VECTOR, xi) - y), -1.4, 1.4);
         float by = largest(abs(next - xi));
         xi = next;
         if (by < 1e-4) break;
       }
-      error = largest(abs(bent(at + 6, xi) - y));
+      error = largest(abs(bent(at + BEND_VECTOR, xi) - y));
       if (error < 2e-6) error = 0.0;
     } else {
       error = 10.0;
@@ -75,14 +72,14 @@ vec3 hexahedron(vec3 p, int at, out float error) {
 
 // Takes p and the direction v to canonical space by the coordinates xi in the hexahedron at a row.
 void image(vec3 xi, int at, inout vec3 p, inout vec3 v) {
-  vec3 along = times(at, v);
-  int c = at + 10;
+  vec3 along = times(at + MATRIX_VECTOR, v);
+  int c = at + IMAGE_VECTOR;
   vec3 c1 = rows[c + 1].xyz;
   vec3 c2 = rows[c + 2].xyz;
   vec3 c4 = rows[c + 4].xyz;
   p = rows[c].xyz + xi.x * c1 + xi.y * c2 + xi.z * c4;
-  if (rows[at].w < 0.5) {
-    along = bendSolve(at + 6, xi, along);
+  if (rows[at + AFFINE_SCALAR].w < 0.5) {
+    along = bendSolve(at + BEND_VECTOR, xi, along);
     vec3 c3 = rows[c + 3].xyz;
     vec3 c5 = rows[c + 5].xyz;
     vec3 c6 = rows[c + 6].xyz;
@@ -95,15 +92,15 @@ void image(vec3 xi, int at, inout vec3 p, inout vec3 v) {
   v = along.x * c1 + along.y * c2 + along.z * c4;
 }
 
-vec3 node(int n) { return texelFetch(lattice, ivec2(n & ${LATTICE_WIDTH - 1}, n >> ${Math.log2(LATTICE_WIDTH)}), 0).xyz; }
+vec3 node(int n) { return texelFetch(lattice, ivec2(n & (NODES_PER_TEXTURE_ROW - 1), n >> ${Math.log2(EDIT_LAYOUT.NODES_PER_TEXTURE_ROW)}), 0).xyz; }
 
 void interpolate(int e, int resolution_, vec3 at, inout vec3 p, inout vec3 v) {
-  vec3 s = times(e + 3, v);
+  vec3 s = times(e + TO_NODES_VECTOR, v);
   vec3 g = clamp(at, 0.0, float(resolution_ - 1));
   ivec3 cell = min(ivec3(g), resolution_ - 2);
   vec3 f = g - vec3(cell);
   int plane = resolution_ * resolution_;
-  int n = int(rows[e + 6].w) + (cell.z * resolution_ + cell.y) * resolution_ + cell.x;
+  int n = int(rows[e + NODE_SCALAR].w) + (cell.z * resolution_ + cell.y) * resolution_ + cell.x;
   vec3 v000 = node(n);
   vec3 v010 = node(n + resolution_);
   vec3 v001 = node(n + plane);
@@ -129,31 +126,31 @@ void interpolate(int e, int resolution_, vec3 at, inout vec3 p, inout vec3 v) {
 // Takes a sample through the edit whose numbers begin at a row. Where it is to be read then: 0 in the field, or by
 // the place of a layer, how many vertices further along x; -1 nowhere.
 int mapEdit(int e, inout vec3 p, inout vec3 v) {
-  bool continuous = rows[e + 3].w > 0.5;
-  int resolution_ = int(rows[e + 2].w);
-  int first = e + 8;
-  if (rows[e + 4].w > 0.5) {
-    vec3 y = times(first, p - rows[first + 3].xyz);
+  bool continuous = rows[e + CONTINUOUS_SCALAR].w > 0.5;
+  int resolution_ = int(rows[e + RESOLUTION_SCALAR].w);
+  int first = e + HEXAHEDRON;
+  if (rows[e + SIMPLE_SCALAR].w > 0.5) {
+    vec3 y = times(first + MATRIX_VECTOR, p - rows[first + CENTER_VECTOR].xyz);
     if (largest(abs(y)) <= 1.0 + EDGE) {
       image(clamp(y, -1.0, 1.0), first, p, v);
       return 0;
     }
-    vec3 at = times(e + 3, p - rows[e + 2].xyz);
-    if (inBox(at, rows[e + 6].xyz, rows[e + 7].xyz)) interpolate(e, resolution_, at, p, v);
+    vec3 at = times(e + TO_NODES_VECTOR, p - rows[e + LATTICE_VECTOR].xyz);
+    if (inBox(at, rows[e + NODE_BOX_VECTOR].xyz, rows[e + NODE_BOX_VECTOR + 1].xyz)) interpolate(e, resolution_, at, p, v);
     return 0;
   }
   float error;
-  if (rows[e].w < 0.5) {
+  if (rows[e + FIRST_SCALAR].w < 0.5) {
     vec3 xi = hexahedron(p, first, error);
     if (error <= EDGE) {
       image(xi, first, p, v);
-      return int(rows[e + 7].w);
+      return int(rows[e + PART_SCALAR].w);
     }
   }
-  if (rows[e + 1].w < 1.5) return 0;
-  hexahedron(p, first + 18, error);
-  if (!continuous) return error <= EDGE ? int(rows[e + 5].w) : 0;
-  if (error <= EDGE) interpolate(e, resolution_, times(e + 3, p - rows[e + 2].xyz), p, v);
+  if (rows[e + LAST_SCALAR].w < 1.5) return 0;
+  hexahedron(p, first + HEXAHEDRON_ROWS, error);
+  if (!continuous) return error <= EDGE ? int(rows[e + UNDER_SCALAR].w) : 0;
+  if (error <= EDGE) interpolate(e, resolution_, times(e + TO_NODES_VECTOR, p - rows[e + LATTICE_VECTOR].xyz), p, v);
   return 0;
 }
 
@@ -163,7 +160,7 @@ vec2 editedPart(vec3 origin, vec3 d) {
   vec2 part = vec2(1e30, -1e30);
   vec3 inverse_ = safeInverse(d);
   for (int k = 0; k < boxCount; k++) {
-    int at = editCount * ROW + 2 * k;
+    int at = editCount * EDIT_ROWS + BOX_ROWS * k;
     vec2 through = slab(origin, inverse_, rows[at].xyz, rows[at + 1].xyz);
     if (through.x <= through.y) part = vec2(min(part.x, through.x), max(part.y, through.y));
   }
@@ -193,11 +190,11 @@ export function unrolled(edits: number): number | null {
 /** The source for so many edits; see `unrolled`. */
 export function editsSource(count: number | null): string {
   const one = (e: string): string =>
-    `if (place == 0 && inBox(p, rows[${e}].xyz, rows[${e} + 1].xyz)) place = mapEdit(${e}, p, v);`;
+    `if (place == 0 && inBox(p, rows[${e} + BOX_VECTOR].xyz, rows[${e} + BOX_VECTOR + 1].xyz)) place = mapEdit(${e}, p, v);`;
   const all =
     count === null
-      ? [`for (int n = editCount - 1; n >= 0; n--) { ${one("n * ROW")} }`]
-      : Array.from({ length: count }, (_, n) => one(`${count - 1 - n} * ROW`));
+      ? [`for (int n = editCount - 1; n >= 0; n--) { ${one("n * EDIT_ROWS")} }`]
+      : Array.from({ length: count }, (_, n) => one(`${count - 1 - n} * EDIT_ROWS`));
   const body = [
     "int mapSample(inout vec3 p, inout vec3 v) {",
     "  int place = 0;",

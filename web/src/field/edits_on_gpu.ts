@@ -1,11 +1,13 @@
 /** An edit stack on the GPU: only what is other than before is uploaded. */
-import { LATTICE_WIDTH, MOST_ROWS } from "./edits_glsl";
+import { EDIT_LAYOUT } from "./layout";
 import { checkMemory, largest, plainUnpacking, setFilter, texture3D } from "./gl";
 import type { PageEdits } from "./page_edits";
 
+const { MAX_ROWS, NODES_PER_TEXTURE_ROW } = EDIT_LAYOUT;
+
 type GL = WebGL2RenderingContext;
 
-/** Where a lattice lies in the texture: rows of LATTICE_WIDTH nodes. */
+/** Where a lattice lies in the texture: rows of NODES_PER_TEXTURE_ROW nodes. */
 interface Placed {
   key: string;
   row: number;
@@ -44,7 +46,7 @@ export class EditsOnGpu {
       this.dispose();
       return;
     }
-    if (edits.rows.length > 4 * MOST_ROWS) throw new Error("more edits than the page's shader holds");
+    if (edits.rows.length > 4 * MAX_ROWS) throw new Error("more edits than the page's shader holds");
     this.putRows(edits);
     this.putLattices(edits);
     this.putOccupancy(edits);
@@ -78,7 +80,7 @@ export class EditsOnGpu {
     const isNew = this.buffer === null;
     this.buffer ??= gl.createBuffer();
     gl.bindBuffer(gl.UNIFORM_BUFFER, this.buffer);
-    if (isNew) gl.bufferData(gl.UNIFORM_BUFFER, 16 * MOST_ROWS, gl.DYNAMIC_DRAW);
+    if (isNew) gl.bufferData(gl.UNIFORM_BUFFER, 16 * MAX_ROWS, gl.DYNAMIC_DRAW);
     gl.bufferSubData(gl.UNIFORM_BUFFER, 0, rows);
     gl.bindBuffer(gl.UNIFORM_BUFFER, null);
     this.uploaded.last += rows.byteLength;
@@ -86,7 +88,7 @@ export class EditsOnGpu {
 
   private putLattices({ lattices }: PageEdits): void {
     const { gl } = this;
-    const heights = lattices.map(({ halves }) => Math.ceil(halves.length / (3 * LATTICE_WIDTH)));
+    const heights = lattices.map(({ halves }) => Math.ceil(halves.length / (3 * NODES_PER_TEXTURE_ROW)));
     const rows = Math.max(
       1,
       heights.reduce((sum, height) => sum + height, 0),
@@ -104,10 +106,20 @@ export class EditsOnGpu {
     this.lattices.placed = lattices.map(({ key, halves }, n) => {
       const at: Placed = { key, row };
       if (placed.every((before) => before.key !== key || before.row !== at.row)) {
-        const whole = 3 * LATTICE_WIDTH * heights[n];
+        const whole = 3 * NODES_PER_TEXTURE_ROW * heights[n];
         const data = halves.length === whole ? halves : new Uint16Array(whole);
         if (data !== halves) data.set(halves);
-        gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, LATTICE_WIDTH, heights[n], gl.RGB, gl.HALF_FLOAT, data);
+        gl.texSubImage2D(
+          gl.TEXTURE_2D,
+          0,
+          0,
+          row,
+          NODES_PER_TEXTURE_ROW,
+          heights[n],
+          gl.RGB,
+          gl.HALF_FLOAT,
+          data,
+        );
         this.uploaded.last += data.byteLength;
       }
       row += heights[n];
@@ -121,7 +133,7 @@ export class EditsOnGpu {
     const { gl } = this;
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGB16F, LATTICE_WIDTH, rows);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGB16F, NODES_PER_TEXTURE_ROW, rows);
     setFilter(gl, gl.TEXTURE_2D, gl.NEAREST);
     return texture;
   }

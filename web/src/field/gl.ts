@@ -2,6 +2,13 @@
 
 type GL = WebGL2RenderingContext;
 
+/** Definitions of numbers for GLSL, one line each. */
+export function defines(numbers: Readonly<Record<string, number>>): string {
+  return Object.entries(numbers)
+    .map(([name, value]) => `#define ${name} ${value}`)
+    .join("\n");
+}
+
 /** A linked program, its uniforms' places, and how long it took until it could draw. */
 export interface Program {
   program: WebGLProgram;

@@ -32,7 +32,7 @@ export interface PageEdits {
   edits: number;
   boxes: number;
   preserveOpacity: boolean;
-  /** [edits * ROW + boxes * 2, 4]. */
+  /** [EDIT_ROWS edits + BOX_ROWS boxes, 4], in the layout of `cagefield.pages.row_layout`. */
   rows: Float32Array;
   lattices: Lattice[];
   layers: PlacedLayer[];

@@ -1,3 +1,5 @@
+import { defines } from "../field/gl";
+import { SPLAT_CONSTANTS } from "../field/layout";
 import { WIDTH } from "./project_glsl";
 
 /**
@@ -8,7 +10,10 @@ import { WIDTH } from "./project_glsl";
  * A quad is the parallelogram |x + k y| <= sqrt(reach / A), |y| <= sqrt(reach / D) around the ellipse q = reach at which
  * alpha is ALPHA_MIN.
  */
+const CONSTANTS = defines(SPLAT_CONSTANTS);
+
 export const QUADS = `#version 300 es
+${CONSTANTS}
 precision highp float;
 precision highp int;
 precision highp usampler2D;
@@ -32,7 +37,7 @@ void main() {
 #ifdef NORMALS
   axis = uintBitsToFloat(texelFetch(normals, here, 0)).xyz;
 #endif
-  float reach = 2.0 * log(255.0 * how.y);
+  float reach = 2.0 * log(how.y / ALPHA_MIN);
   // Two triangles: corners 0 1 2 and 3 2 1.
   int number = side < 3 ? side : 6 - side;
   vec2 corner = vec2(float(number & 1), float(number >> 1)) * 2.0 - 1.0;
@@ -42,6 +47,7 @@ void main() {
 }`;
 
 export const SPLAT = `#version 300 es
+${CONSTANTS}
 precision highp float;
 flat in vec4 where;
 flat in vec4 how;
@@ -58,8 +64,8 @@ void main() {
   vec2 d = vec2(gl_FragCoord.x, size.y - gl_FragCoord.y) - where.xy;
   float l = d.x + where.w * d.y;
   float q = where.z * l * l + how.x * d.y * d.y;
-  float a = min(how.y * exp(-0.5 * q), 0.99);
-  if (a < 1.0 / 255.0) discard;
+  float a = min(how.y * exp(-0.5 * q), ALPHA_MAX);
+  if (a < ALPHA_MIN) discard;
   outColour = vec4(a * colour.rgb, a);
   outDepth = vec4(a * unit * (how.z + how.w * d.x + colour.w * d.y), 0.0, 0.0, a);
 #ifdef NORMALS

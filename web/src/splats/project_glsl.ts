@@ -5,6 +5,8 @@
  * derivative of the pixel by the point, the projected covariance is N N^T, and its determinant the square of the cross
  * product of N's rows: no difference of large numbers.
  */
+import { defines } from "../field/gl";
+import { SPLAT_CONSTANTS } from "../field/layout";
 import { BASIS } from "../field/harmonics_glsl";
 import { harmonicWords } from "./splat_file";
 
@@ -38,7 +40,7 @@ layout(location = 1) out uvec4 shape;
 // Colour, slope of the distance along y.
 layout(location = 2) out uvec4 tint;
 
-const float BLUR = 0.3, SLOPE_BLUR = 0.02, ALPHA_MIN = 1.0 / 255.0, LEAST_COMPENSATION = 0.005;
+${defines(SPLAT_CONSTANTS)}
 
 uvec4 texel(usampler2D from, uint n) { return texelFetch(from, ivec2(n % ${WIDTH}u, n / ${WIDTH}u), 0); }
 

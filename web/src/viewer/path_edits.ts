@@ -1,5 +1,5 @@
 /** The edits along a camera path: states, and what lies between two of them (see `cagefield.pages.page_path`). */
-import { ROW } from "../field/edits_glsl";
+import { EDIT_LAYOUT } from "../field/layout";
 import { joined } from "../field/level";
 import type { Vec3 } from "../field/level";
 import { ByteReader, PageFile } from "../field/page_file";
@@ -31,8 +31,10 @@ interface State {
   layers: PlacedLayer[];
 }
 
-/** Rows of an edit of which lower and upper ends of a box are kept: its own, and those of its two hexahedra. */
-const LOWS = [0, 12, 30];
+const { BOX_ROWS, BOX_VECTOR, EDIT_ROWS, HEXAHEDRON, HEXAHEDRON_ROWS, Y_BOX_VECTOR } = EDIT_LAYOUT;
+
+/** First rows of the boxes of an edit, whose union is taken between two states: its own, and those of its hexahedra. */
+const EDIT_BOXES = [BOX_VECTOR, HEXAHEDRON + Y_BOX_VECTOR, HEXAHEDRON + HEXAHEDRON_ROWS + Y_BOX_VECTOR];
 
 export class PathEdits {
   private constructor(
@@ -113,11 +115,11 @@ function alike(one: State, other: State): boolean {
 
 function mixedRows({ edits, boxes, rows }: State, { rows: others }: State, share: number): Float32Array {
   const out = rows.map((value, n) => value + share * (others[n] - value));
-  const hold = (low: number): void => {
+  const unite = (low: number): void => {
     for (let n = 4 * low; n < 4 * low + 3; n++) out[n] = Math.min(rows[n], others[n]);
     for (let n = 4 * low + 4; n < 4 * low + 7; n++) out[n] = Math.max(rows[n], others[n]);
   };
-  for (let e = 0; e < edits; e++) for (const low of LOWS) hold(e * ROW + low);
-  for (let b = 0; b < boxes; b++) hold(edits * ROW + 2 * b);
+  for (let e = 0; e < edits; e++) for (const low of EDIT_BOXES) unite(e * EDIT_ROWS + low);
+  for (let b = 0; b < boxes; b++) unite(edits * EDIT_ROWS + BOX_ROWS * b);
   return out;
 }
