@@ -172,7 +172,8 @@ def test_textures_grow_for_layers_up_to_the_memory(page: FieldPage) -> None:
         for n, cage in enumerate(cages)
     )
     renderer = VoxelRenderer(field, edits)
-    content, few = encode_page_edits(renderer), encode_page_edits(VoxelRenderer(field, PreparedStack(edits[:1])))
+    first = VoxelRenderer(field, PreparedStack(edits[:1]))
+    content, few = encode_page_edits(renderer), encode_page_edits(first)
     page.edit(None)
     bytes_before = page.load(encode_page_field(field))["bytes"]
     page.edit(few)
