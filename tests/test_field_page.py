@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cagefield.cameras.camera import Camera, turntable
-from cagefield.edits import Edit, EditStack, Trilinear
+from cagefield.edits import Edit, EditStack, PreparedStack, Trilinear
 from cagefield.errors import EditError
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
@@ -224,8 +224,10 @@ def test_a_shell_without_a_lattice_gets_one_for_pages() -> None:
     exact = EditStack([TURNED.replace(lattice=None), MOVED])
     with pytest.raises(EditError, match='edit "turned" has no lattice'):
         encode_page_edits(VoxelRenderer(lumps(0, False), exact))
-    assert [edit.lattice for edit in for_pages(exact)] == [LATTICE, None]
-    assert for_pages(EditStack([TURNED.replace(lattice=200)])).active[0].lattice == FINEST_LATTICE
+    turned, moved = for_pages(PreparedStack(exact))
+    assert turned.edit == TURNED.replace(lattice=LATTICE) and moved.edit is MOVED
+    (fine,) = for_pages(PreparedStack([TURNED.replace(lattice=200)]))
+    assert fine.edit == TURNED.replace(lattice=FINEST_LATTICE)
 
 
 def test_a_page_is_sent_what_it_has_not(page: FieldPage) -> None:
