@@ -141,7 +141,7 @@ def test_what_memory_cannot_hold_is_refused_before_its_digest(
     monkeypatch.setattr("cagefield.files.memory.free_memory", lambda: 16 << 30)
     monkeypatch.setattr(splat_file_scene, "_digest", lambda *_: pytest.fail("it was gone through"))
     monkeypatch.setattr(
-        "cagefield.formats.splats.antimatter15_splat._plausible", lambda *_: True
+        "cagefield.formats.splats.antimatter15_splat._is_plausible", lambda *_: True
     )  # zeros are no splats
     with pytest.raises(CagefieldError, match=r"its 671088640 splats are too many: it takes 37\.6 GB"):
         scene_of_file(huge)
@@ -188,7 +188,7 @@ def test_a_large_file_of_few_splats_is_refused_before_its_digest(
     monkeypatch.setattr(splat_file_scene, "_MOST_OF_ONE", 1)
     monkeypatch.setattr(splat_file_scene, "_digest", lambda *_: pytest.fail("it was gone through"))
     monkeypatch.setattr(
-        "cagefield.formats.splats.antimatter15_splat._plausible", lambda *_: True
+        "cagefield.formats.splats.antimatter15_splat._is_plausible", lambda *_: True
     )  # zeros are no splats
     with pytest.raises(CagefieldError, match=f"it has {size} bytes for 600 splats; it is damaged"):
         scene_of_file(packed)

@@ -169,7 +169,7 @@ def test_a_renderer_uses_them_with_edits_too(monkeypatch: pytest.MonkeyPatch) ->
     stacks = [EditStack(), EditStack([Edit.continuous(inner, inner.grown(0.4)).translate((0.1, 0.0, 0.1))]),
               EditStack([Edit.delete(inner)])]  # fmt: skip
     want = [SplatRenderer(field, stack).render(view) for stack in stacks]
-    monkeypatch.setattr(splat_renderer, "LEAST", 1000)
+    monkeypatch.setattr(splat_renderer, "MIN_CLUSTERED_SPLATS", 1000)
     renderer = SplatRenderer(field)
     for stack, expected in zip(stacks, want, strict=True):
         edited = renderer.with_edits(stack)

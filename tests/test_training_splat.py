@@ -163,7 +163,9 @@ def test_the_world_s_units_and_axes_do_not_matter(capture):
         rigid = np.eye(4)
         rigid[:3, :3], rigid[:3, 3] = turn, scale * np.array([0.3, -0.2, 0.5])
         moved = Similarity(rigid, scale)
-        dataset = moved.dataset(capture, moved.points(BOX.mean(axis=0)[None]) + scale * BOX)
+        dataset = moved.transform_dataset(
+            capture, moved.transform_points(BOX.mean(axis=0)[None]) + scale * BOX
+        )
         assert len(SplatRun(dataset, config).state) == pytest.approx(len(begun.state), rel=0.01)
         result = train_splat(dataset, config)
         assert result.test_psnr == pytest.approx(expected.test_psnr, abs=0.2)
