@@ -140,7 +140,7 @@ def test_vertices_are_copied_as_they_are(folder: Path) -> None:
     scene, other = Scene.open(folder / "place"), Scene.open(folder / "thing").field
     assert isinstance(other, VoxelField)
     small = Edit.paste("../thing", Cage.box((0.1, 0.1, 0.0), 0.8)).translate((0.6, 0.0, 0.0))
-    (edit,) = scene.with_edits(EditStack([small.replace(relight="none")])).patched_edits
+    (edit,) = scene.with_edits(EditStack([small.replace(relight="none")])).prepared_edits
     assert edit.part is not None and edit.part.resolution == scene.field.resolution
     block = extract_block(other, EditStack(), np.array([[-0.2, -0.2, -0.3], [0.4, 0.4, 0.3]]))
     every = np.ones(block.shape, bool)
@@ -167,7 +167,7 @@ def test_kernel_and_oracle_show_the_same(folder: Path, contracted: bool) -> None
     after = Edit.copy(Cage.box(BY, 1.2))
     stack = scene.with_edits(
         EditStack([pasted(0.7), after.translate((-0.8, 0.0, 1.1)).replace(relight="none")])
-    ).patched_edits
+    ).prepared_edits
     frame = VoxelRenderer(field, stack, step=0.25).render(view(40), background="black")
     source = field.__call__ if contracted else field
     oracle = render_sampled(source, view(40), near=4.0, far=8.5, samples=500, edits=stack, background="black")
@@ -331,12 +331,12 @@ def test_a_scene_that_changed_is_read_again(folder: Path, tmp_path: Path) -> Non
     Scene.open(folder / "thing").save(tmp_path / "thing")
     edit = Edit.paste(str(tmp_path / "thing"), cage()).replace(relight="none").translate(BY)
     scene = Scene.open(folder / "place").with_edits(EditStack([edit]))
-    first = scene.patched_edits[0].part
-    assert scene.patched_edits[0].part is first
+    first = scene.prepared_edits[0].part
+    assert scene.prepared_edits[0].part is first
     thing = Scene.open(tmp_path / "thing")
     gone = Edit.delete(Cage.box((0.4, 0.1, 0.1), 0.3)).replace(fill="none", relight="none")
     thing.with_edits(EditStack([gone])).save(tmp_path / "thing", overwrite=True)
-    second = scene.patched_edits[0].part
+    second = scene.prepared_edits[0].part
     assert first is not None and second is not None and second.density.sum() < 0.99 * first.density.sum()
 
 

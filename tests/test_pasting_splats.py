@@ -91,7 +91,7 @@ def test_what_is_made_is_the_oracles(folder: Path) -> None:
     after = Edit.copy(Cage.box(BY, 1.0)).translate((0.0, 1.5, 0.0))
     again = pasted().translate((0.0, -2.5, 0.0))
     scene = with_heap(folder, before, pasted(), after, again)
-    edits = scene.patched_edits
+    edits = scene.prepared_edits
     field = with_pasted(scene.field, edits)  # type: ignore[arg-type]
     assert field is with_pasted(scene.field, edits) is with_pasted(field, edits)  # type: ignore[arg-type]
     for preserve in (True, False):
@@ -123,12 +123,12 @@ def test_a_page_has_what_is_pasted(folder: Path) -> None:
     held = decode_page_splats(page.files["field"]).field
     edits = decode_page_splat_edits(page.files["edits"])
     assert len(held) == 660 and held.sh_degree == 2
-    field = with_pasted(scene.field, scene.patched_edits)  # type: ignore[arg-type]
+    field = with_pasted(scene.field, scene.prepared_edits)  # type: ignore[arg-type]
     order = page_order(field)
     ours = order >= 600
     assert (held.opacities[ours] == 0.0).all() and (held.opacities[~ours] > 0.5).all()
     assert edits.hidden[ours].all() and not edits.hidden[~ours].any()
-    changed = changed_splats(field, scene.patched_edits)
+    changed = changed_splats(field, scene.prepared_edits)
     assert len(edits.sources) == 60 and (np.sort(order[edits.sources]) == np.arange(600, 660)).all()
     place = np.argsort(order)[changed.sources]
     means = changed.splats.means[np.argsort(place, kind="stable")]
@@ -140,7 +140,7 @@ def test_surroundings_get_a_shadow(tmp_path: Path) -> None:
     Scene(room(True)).save(tmp_path / "box")
     bare = Scene(room(False), folder=tmp_path / "floor")
     edit = Edit.paste("../box", cage()).translate((-0.5, 0.25, 0.0))
-    (ready,) = bare.with_edits(EditStack([edit.replace(relight="none")])).patched_edits
+    (ready,) = bare.with_edits(EditStack([edit.replace(relight="none")])).prepared_edits
     truth = seen(room(True, by=(-0.5, 0.25)), EditStack())
     patch = build_splat_patch(bare.field, EditStack(), edit, LIGHT, pasted=ready.pasted)  # type: ignore[arg-type]
     shaded = replace(ready, patch=patch)
@@ -155,7 +155,7 @@ def test_what_an_earlier_edit_was_filled_with_stays_beside_a_paste(tmp_path: Pat
     gone = Edit.delete(cage())
     gone = PreparedEdit(gone, build_splat_patch(scene.field, EditStack(), gone, LIGHT))  # type: ignore[arg-type]
     far = Edit.paste("../box", cage()).replace(relight="none").translate((9.0, 0.0, 0.0))
-    (far,) = scene.with_edits(EditStack([far])).patched_edits
+    (far,) = scene.with_edits(EditStack([far])).prepared_edits
     alone, both = (seen(scene.field, PreparedStack(edits)) for edits in ([gone], [gone, far]))  # type: ignore[arg-type]
     assert psnr(both, alone) > 60.0 > psnr(seen(scene.field, PreparedStack([far])), alone) + 20.0  # type: ignore[arg-type]
 

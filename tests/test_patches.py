@@ -168,7 +168,7 @@ def test_shadows_go_along(scenes: tuple[Scene, Scene]) -> None:
 def test_switched_off_nothing_is_patched(scenes: tuple[Scene, Scene]) -> None:
     scene, _ = scenes
     edit = dataclasses.replace(Edit.delete(cage()), fill="none", relight="none")
-    assert not needs_patch(edit) and scene.with_edits(EditStack([edit])).patched_edits[0].patch is None
+    assert not needs_patch(edit) and scene.with_edits(EditStack([edit])).prepared_edits[0].patch is None
     plain = VoxelRenderer(scene.field, EditStack([edit])).render(cameras()[0])  # type: ignore[arg-type]
     own = scene.with_edits(EditStack([edit])).render(cameras()[0])
     assert plain is not None and np.array_equal(plain.rgb, own.rgb)

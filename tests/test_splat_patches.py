@@ -201,9 +201,9 @@ def test_scenes_fill_and_relight_splats_unless_told_not_to():
     field = room(True)
     edit = Edit.delete(cage())
     scene = Scene(field, edits=EditStack([edit]), cameras={"train": cameras()})
-    (made,) = scene.patched_edits
+    (made,) = scene.prepared_edits
     assert isinstance(made.patch, SplatPatch) and len(made.patch.sources) > 50
-    (kept,) = scene.with_edits(EditStack([edit.replace(fill="none", relight="none")])).patched_edits
+    (kept,) = scene.with_edits(EditStack([edit.replace(fill="none", relight="none")])).prepared_edits
     assert kept.patch is None
     patcher = Patcher(field, cameras(), lambda camera: pytest.fail("a drag found out about the light"))
     (moving,) = patcher.prepare([edit], moving=True)

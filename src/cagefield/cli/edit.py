@@ -51,7 +51,7 @@ class ApplyEdits:
         stack.check()
         for edit in stack:
             if isinstance(edit, Paste) and edit.enabled:
-                scene.with_edits(EditStack([edit.replace(relight="none")])).patched_edits  # noqa: B018  a scene that is not there
+                scene.with_edits(EditStack([edit.replace(relight="none")])).prepared_edits  # noqa: B018  a scene that is not there
         lines = describe_edits(stack, scene.field)
         if not self.check:
             check_destination(destination, self.overwrite)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cagefield.compute import devices
 from cagefield.compute.block_cyclic import block_cyclic_schedule
-from cagefield.compute.identity_memo import memoized_by_identity
+from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.edits.buffer_pool import BufferPool
 from cagefield.edits.device.kernels.device_stack import map_samples
 from cagefield.edits.device.kernels.edit_maps import EditArgs
@@ -115,12 +115,12 @@ def _row_of(step: PreparedEdit) -> NDArray[np.float32]:
     return _row_of_edit(step.edit) if step.is_bare else _row_of_step(step)
 
 
-@memoized_by_identity
+@memoized_weakly
 def _row_of_edit(edit: Edit) -> NDArray[np.float32]:
     return _packed(PreparedEdit(edit))
 
 
-@memoized_by_identity
+@memoized_weakly
 def _row_of_step(step: PreparedEdit) -> NDArray[np.float32]:
     return _packed(step)
 
@@ -140,7 +140,7 @@ def _nodes_of(edit: Edit) -> NDArray[np.float32]:
     return _flow_table(edit) if edit.lattice is None else edit.lattice_nodes
 
 
-@memoized_by_identity
+@memoized_weakly
 def _flow_table(edit: Continuous) -> NDArray[np.float32]:
     """The table [T,3] of an exact flow shell, see `flow_table`; [0,3] of another shell."""
     shell = edit.exact_warp.shell

@@ -13,7 +13,7 @@ from typing import Any, TypedDict, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cagefield.compute.identity_memo import memoized_by_identity
+from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.edits import operations as ops
 from cagefield.edits.edit_names import problem_of_name, problem_of_source
 from cagefield.edits.operation_sequence import ImpossibleOperationError, cages_along, problem_of_count
@@ -492,7 +492,7 @@ class Continuous(Edit):
         return self.shell.build(self.inner, self.deformed, self.outer)
 
 
-@memoized_by_identity
+@memoized_weakly
 def _lattice_nodes(edit: Continuous) -> Float32:
     from cagefield.edits.device.edit_lattice import sample_nodes
 

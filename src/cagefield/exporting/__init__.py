@@ -55,7 +55,7 @@ def edited_splats(scene: Scene) -> SplatField:
     """The splats of a scene of splats as its edits make them. Raises EditError for an edit that cannot be."""
     if not isinstance(scene.field, SplatField):
         raise CagefieldError("the scene holds voxels, no splats; fit splats to it")
-    return baked_splats(scene.field, scene.patched_edits, preserve_opacity=scene.preserve_opacity)
+    return baked_splats(scene.field, scene.prepared_edits, preserve_opacity=scene.preserve_opacity)
 
 
 def fitted_splats(
@@ -74,7 +74,7 @@ def fitted_splats(
         scene.renderer,
         cameras,
         held_out,
-        edited_bounds(scene.field.bounds, scene.patched_edits),
+        edited_bounds(scene.field.bounds, scene.prepared_edits),
         config,
         unbounded=scene.field.unbounded,
         on_stage=on_stage,
@@ -91,7 +91,7 @@ def fitting_cameras(scene: Scene) -> Cameras:
         scene.cameras.get("train") or (camera for group in scene.cameras.values() for camera in group)
     )
     test = scene.cameras.get("test", ()) if "train" in scene.cameras else ()
-    bounds = edited_bounds(scene.field.bounds, scene.patched_edits)
+    bounds = edited_bounds(scene.field.bounds, scene.prepared_edits)
     beyond = not np.allclose(bounds, scene.field.bounds)
     if not train or (beyond and not scene.field.unbounded):
         train += _rings(bounds, scene.up)
@@ -147,11 +147,11 @@ def scene_mesh(
     edited = bool(scene.edits.active)
     if not isinstance(field, SplatField) and not (edited or field.contracted or resolution):
         return extract_mesh(field)
-    bounds = edited_bounds(field.bounds, scene.patched_edits)
+    bounds = edited_bounds(field.bounds, scene.prepared_edits)
     if isinstance(field, SplatField):
         source: SplatField | EditedField = replace(edited_splats(scene), bounds=bounds)
     else:
-        source = EditedField(field, KernelMap(scene.patched_edits), bounds, scene.preserve_opacity)
+        source = EditedField(field, KernelMap(scene.prepared_edits), bounds, scene.preserve_opacity)
     if resolution is None:
         resolution = int(np.clip((bounds[1] - bounds[0]).max() / field.sample_spacing + 1, 64, 384))
     eyes = [camera.origin for group in scene.cameras.values() for camera in group]

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.compute.identity_memo import memoized_by_identity
+from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.errors import FieldError
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.pages.page_file import byte_planes, from_byte_planes, pack, unpack
@@ -179,7 +179,7 @@ def unit_of(field: VoxelField) -> float:
     return 1.0 / float(field.voxel_size.min())
 
 
-@memoized_by_identity
+@memoized_weakly
 def steps_of(field: VoxelField) -> Float32:
     """Steps [K] of a field's colour coefficients, of which 127 reach the largest that a picture shows."""
     largest = np.abs(field.sh[_shown(field)]).max(axis=(0, 2), initial=0.0)

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.compute.identity_memo import memoized_by_identity
+from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.fields.voxel_layers import layer_slices
 from cagefield.pages.page_field import BRICK, encode_vertices, quantised_colours, quantised_density
@@ -28,7 +28,7 @@ from cagefield.typing import Float32
 AS_FIELD, OTHER, EMPTY = 0, 1, 2
 
 
-@memoized_by_identity
+@memoized_weakly
 def layer_key(layer: VoxelField) -> str:
     """Digest of a layer's content."""
     return digest(layer.vertices, layer.density, layer.sh)

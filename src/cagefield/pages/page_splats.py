@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.compute.identity_memo import memoized_by_identity
+from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.errors import FieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats.morton import morton_codes
@@ -268,7 +268,7 @@ def _decode_level(header: dict[str, Any], parts: dict[str, NDArray[Any]], count:
     return means, log_scales, quaternions, opacities, sh
 
 
-@memoized_by_identity
+@memoized_weakly
 def _layout(field: SplatField) -> tuple[NDArray[np.int64], tuple[int, ...]]:
     """(rows [N] in a page's order, where levels end)."""
     codes = morton_codes(field.means, field.means.min(axis=0), field.means.max(axis=0))

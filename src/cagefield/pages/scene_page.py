@@ -91,7 +91,7 @@ class ScenePage:
             plain = VoxelRenderer(field, EditStack([]), preserve_opacity=scene.preserve_opacity)
             found = {"field": encode_page_field(field, step=step, background=scene.background)}
             if scene.edits.active:
-                found["edits"] = encode_page_edits(plain.with_edits(for_pages(scene.patched_edits)))
+                found["edits"] = encode_page_edits(plain.with_edits(for_pages(scene.prepared_edits)))
             along = path_edits(plain, scene.edits, keys, loop, scene.patcher, on_progress=on_progress)
         if along is not None:
             found["path"] = along.data
@@ -166,7 +166,7 @@ def _splat_files(
             "the scene's splats are discs (2DGS), which pages do not draw; "
             "export them as .ply, or render a video"
         )
-    preserve_opacity, edits = scene.preserve_opacity, scene.patched_edits
+    preserve_opacity, edits = scene.preserve_opacity, scene.prepared_edits
     field = with_pasted(field, edits)
     found = {"field": encode_page_splats(field, background=scene.background)}
     if edits.steps:

@@ -53,7 +53,7 @@ class OpenedScene(Protocol):
     def preserve_opacity(self) -> bool: ...
 
     @property
-    def patched_edits(self) -> PreparedStack: ...
+    def prepared_edits(self) -> PreparedStack: ...
 
 
 class SceneSources:
@@ -91,7 +91,7 @@ class SceneSources:
         path = self._path(source)
         if is_scene(path):
             scene = self._open(path, self._pasting)
-            content = SourceContent(scene.field, scene.patched_edits, scene.preserve_opacity)
+            content = SourceContent(scene.field, scene.prepared_edits, scene.preserve_opacity)
         else:
             content = SourceContent(imported_splats(path).field, EditStack([]))
         self._last = (state, content)

@@ -408,7 +408,7 @@ class Scene:
         from cagefield.rendering.renderers import renderer_of
 
         origin: InteractiveRenderer | None = self.__dict__.get("_origin")
-        edits = self.patched_edits
+        edits = self.prepared_edits
         if origin is not None:
             return origin.with_edits(edits, preserve_opacity=self.preserve_opacity)
         return renderer_of(self.field, edits, preserve_opacity=self.preserve_opacity)
@@ -428,7 +428,7 @@ class Scene:
         return Patcher(self.field, self.cameras.get("train", ()), render, PasteLoader(self.sources))
 
     @property
-    def patched_edits(self) -> PreparedStack:
+    def prepared_edits(self) -> PreparedStack:
         """The edits with the patches that they ask for. Raises EditError for a paste that is not possible."""
         return self.patcher.prepare(self.edits.edits, preserve_opacity=self.preserve_opacity)
 
@@ -449,7 +449,7 @@ class Scene:
 
     @property
     def _exact_edits(self) -> PreparedStack:
-        return self.patched_edits.without_lattices()
+        return self.prepared_edits.without_lattices()
 
 
 def _beside(box: Array, up: Array, size: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Memoization of values by the identity of their source, as long as the source lives."""
+"""Memoization of values for living sources: equal sources share a value."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Source = TypeVar("Source")
 Value = TypeVar("Value")
 
 
-def memoized_by_identity(make: Callable[[Source], Value]) -> Callable[[Source], Value]:
+def memoized_weakly(make: Callable[[Source], Value]) -> Callable[[Source], Value]:
     """`make` with its value remembered for each living source; an array becomes read-only.
 
     A value that holds its source keeps the source alive: values hold no source.
