@@ -5,26 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from benchmarks.common.workbench import Settings
 
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.scene.scene import Scene
-from cagefield.training.voxels.voxel_config import VoxelConfig
 
 SH_C0 = 0.28209479177387814
-
-TINY = Settings(
-    views=8,
-    size=32,
-    test_views=3,
-    config=VoxelConfig(steps=60, resolution=24),
-    exact_size=24,
-    exact_views=2,
-    compared_size=16,
-    compared_views=1,
-)
-"""Sizes of a benchmark that runs in seconds."""
 
 
 def ball_field(density: float = 40.0, resolution: int = 17, radius: float = 0.5) -> VoxelField:

@@ -20,8 +20,6 @@ from cagefield.errors import CagefieldError
 from cagefield.images.image_files import read_image
 from cagefield.training.voxels.voxel_config import VoxelConfig
 
-pytestmark = pytest.mark.nightly
-
 TINY = Settings(
     views=16,
     size=32,
@@ -45,6 +43,7 @@ def subject(bench: Workbench) -> Subject:
     return Subject(case, bench, PICTURE)
 
 
+@pytest.mark.nightly
 def test_larger_outer_cages_distort_less_and_change_more(subject: Subject) -> None:
     result = ablations.outer_size(subject, (0.1, 0.5))
     small, large = result.table.rows
@@ -82,6 +81,7 @@ def test_finer_lattices_are_nearer_to_the_exact_map(subject: Subject) -> None:
     assert result.picture.shape[1] == 3 * PICTURE + 2 * 8
 
 
+@pytest.mark.nightly
 def test_discrete_edits_change_less_than_continuous_ones(subject: Subject) -> None:
     result = ablations.discrete_continuous(subject)
     assert [row[0] for row in result.table.rows] == ["continuous", "discrete", "discrete copy"]
@@ -91,6 +91,7 @@ def test_discrete_edits_change_less_than_continuous_ones(subject: Subject) -> No
     assert changed[2] <= changed[1]
 
 
+@pytest.mark.nightly
 def test_limits(bench: Workbench) -> None:
     (case,) = chosen(["plant"], ["move_pinecone"])
     result = limits(case, bench, 40)

@@ -27,6 +27,7 @@ from benchmarks.edits.edit_quality import measure, write_picture
 from benchmarks.edits.edits_table import Revealed, Score, table
 from benchmarks.edits.mapped_photographs import MappedScene
 
+from benchmark_settings import TINY
 from cagefield.cameras.camera import Camera
 from cagefield.cli import main, parse
 from cagefield.cli.options import TrainingOptions
@@ -39,7 +40,7 @@ from cagefield.procedural import SCENES, ProceduralScene, procedural_scene
 from cagefield.scene.scene import Scene
 from cagefield.training.voxels.train_voxels import train_voxel
 from commands import refused
-from scenes import TINY, ball_scene, files_of
+from scenes import ball_scene, files_of
 
 DISCRETE = [case for case in CASES if case.moved is not None]
 DELETED = {"digger": "bucket", "chair": "back", "microphone": "base", "plant": "flower"}
@@ -173,6 +174,7 @@ def test_views_that_are_right_do_not_make_the_mean_infinite() -> None:
     assert mean_psnr(close, truth) < 50.0
 
 
+@pytest.mark.nightly
 def test_an_edit_of_nothing_loses_nothing(bench: Workbench) -> None:
     scene = bench.scene("microphone")
     cameras = scene.cameras["test"]
@@ -249,6 +251,7 @@ def test_exact_maps_of_no_edit_and_of_parts_that_do_not_move(bench: Workbench) -
 # -- the benchmark -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_scores_table_and_second_run(bench: Workbench, monkeypatch: pytest.MonkeyPatch) -> None:
     cases = [case("microphone", "move_weight"), case("microphone", "bigger_head")]
     scores = list(measure(cases, bench))
@@ -445,6 +448,7 @@ def test_default_edit_covers_a_quarter_of_the_picture() -> None:
     assert frame_times.covered(np.array([[[50.0] * 3, [51.0] * 3]]), cameras) == 0.0
 
 
+@pytest.mark.nightly
 def test_frame_times() -> None:
     scene = ball_scene()
     report = frame_times.measure(scene, scene.cameras["test"], rounds=2, lattices=(None, 8))

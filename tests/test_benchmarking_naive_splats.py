@@ -21,8 +21,6 @@ from cagefield.scene.scene import Scene
 from cagefield.training.splats.splat_config import SplatConfig
 from splat_scenes import random_splats
 
-pytestmark = pytest.mark.nightly
-
 INNER = Cage.box((0, 0, 0), 0.9)
 CAMERA = Camera.look_at((2.6, -1.9, 1.4), (0, 0, 0), width=48, height=40, fov_x=0.75)
 EDITS = {
@@ -32,6 +30,7 @@ EDITS = {
 }
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", EDITS)
 def test_each_way_lacks_what_its_name_says(name: str) -> None:
     field, edits = random_splats(300, degree=2), EditStack([EDITS[name]])
@@ -50,6 +49,7 @@ def test_each_way_lacks_what_its_name_says(name: str) -> None:
     assert np.array_equal(ways["means only"].covariances, whole.covariances) == (name == "delete")
 
 
+@pytest.mark.nightly
 def test_pictures_are_those_of_the_scene_where_nothing_is_bent_cut_or_turned() -> None:
     field = random_splats(200, degree=2)
     cage = Cage.box((0, 0, 0), 50.0)

@@ -22,14 +22,13 @@ torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra ner
 from cagefield.rendering.nerf.nerf_renderer import NerfRenderer  # noqa: E402
 from cagefield.training.nerf.nerf_config import NerfConfig  # noqa: E402
 
-pytestmark = pytest.mark.nightly
-
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workbench, "BAKED", 16)
 
 
+@pytest.mark.nightly
 def test_a_nerf_is_measured_by_its_exact_pictures(tmp_path: Path) -> None:
     config = NerfConfig.small(width=24, depth=3, samples=(12, 12), octaves=(4, 2), precrop_steps=3, steps=8)
     settings = Settings(8, 24, 2, config, exact_size=16, exact_views=1, discrete_views=1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
 from benchmarks.captures.train_captures import Budget, splat_config
 from benchmarks.commands.bench_edits import BenchEdits
 from benchmarks.common.workbench import Settings
@@ -13,8 +12,6 @@ from benchmarks.edits.edits_table import table
 from cagefield.cli.options import TrainingOptions
 from cagefield.training.splats.splat_config import SplatConfig
 from commands import refused
-
-pytestmark = pytest.mark.nightly
 
 
 def test_the_command_trains_splats_for_the_time_or_the_steps_that_are_given() -> None:

@@ -15,8 +15,6 @@ from cagefield.cameras.camera import Camera
 from cagefield.datasets import View
 from cagefield.errors import CagefieldError
 
-pytestmark = pytest.mark.nightly
-
 WIDTH, HEIGHT = 61, 47
 
 

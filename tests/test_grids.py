@@ -14,8 +14,6 @@ from cagefield.cli import main
 from cagefield.errors import CagefieldError
 from cagefield.images.image_files import read_image
 
-pytestmark = pytest.mark.nightly
-
 SIDE = 172  # pixels of 0.01
 
 

@@ -18,7 +18,7 @@ MAP = """
 import json
 import numpy as np
 from cagefield import Cage, Edit
-from cagefield.edits import EditStack
+from cagefield.edits import EditStack, Trilinear
 from cagefield.edits import device_stack
 
 inner = Cage.box((0, 0, 0), 0.5)
@@ -98,6 +98,7 @@ def test_a_folder_that_cannot_be_made_is_done_without(tmp_path: Path) -> None:
     assert "(Not a directory)" in line and "set XDG_CACHE_HOME to a folder that can be written" in line
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("trouble", "reason"),
     [
@@ -118,6 +119,7 @@ def test_a_disk_that_fails_in_the_middle_is_one_line_of_warning(
     assert f"({reason})" in line
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("trouble", "written"), [("", "True"), (LITTLE_ROOM, "False")])
 def test_a_process_writes_no_kernels_as_it_ends_without_room(
     tmp_path: Path, trouble: str, written: str
@@ -134,6 +136,7 @@ def test_a_process_writes_no_kernels_as_it_ends_without_room(
     assert process(tmp_path / "cache", "-c", "\n".join(ends)).stdout.splitlines()[-1] == written
 
 
+@pytest.mark.nightly
 def test_a_full_disk_says_nothing_where_all_kernels_are_kept_already(tmp_path: Path) -> None:
     (tmp_path / "double.py").write_text(DOUBLE)
     assert process(tmp_path / "cache", str(tmp_path / "double.py"), "").stderr == ""

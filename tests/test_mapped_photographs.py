@@ -26,8 +26,6 @@ from cagefield.procedural.shapes import Box, Cylinder, Sphere
 from cagefield.procedural.textures import Plain
 from cagefield.rendering.reference_renderer import intersect_box
 
-pytestmark = pytest.mark.nightly
-
 GREY = Plain((0.6, 0.5, 0.4))
 
 

@@ -26,13 +26,11 @@ from benchmarks.edits.distortion import Distortion
 from benchmarks.edits.exact_maps import exact
 from benchmarks.edits.methods import METHODS
 
+from benchmark_settings import TINY
 from cagefield.cli import main
 from cagefield.edits import EditStack, KernelMap
 from cagefield.edits.operations import MoveCorner, MoveEdge, MoveFace, Rotate, Scale, Shear, Translate
 from cagefield.errors import CagefieldError
-from scenes import TINY
-
-pytestmark = pytest.mark.nightly
 
 CONTINUOUS = [case for case in CASES if case.kind == "continuous"]
 
@@ -64,6 +62,7 @@ def test_a_case_without_a_continuous_edit_has_no_shell() -> None:
         continuous(case("chair", "delete_back"))
 
 
+@pytest.mark.nightly
 def test_methods_share_the_motion_and_differ_in_the_shell(bench: Workbench) -> None:
     cases = [case("microphone", "bigger_head"), case("microphone", "delete_base")]
     methods = ("flow", "trilinear", "trilinear 64", "harmonic")
@@ -102,6 +101,7 @@ def test_summaries_say_where_a_peer_is_better() -> None:
     ]
 
 
+@pytest.mark.nightly
 def test_map_times_are_of_the_whole_stack() -> None:
     stack = METHODS["trilinear 64"].of_all(case("digger", "raise_arm").edits)
     assert len(stack) == 2
@@ -164,6 +164,7 @@ def test_lpips_of_equal_pictures_is_zero() -> None:
 # -- command -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_bench_edits_compares_methods(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, bench: Workbench
 ) -> None:

@@ -23,8 +23,6 @@ from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 from cagefield.warps.hexahedron_map import HexahedronMap
 
-pytestmark = pytest.mark.nightly
-
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
 EDIT = Edit.continuous(INNER, OUTER)
 MOVED = EDIT.translate((0.1, 0.05, -0.05))
@@ -241,6 +239,7 @@ def test_conjugate_gradients_solve() -> None:
     np.testing.assert_allclose(A @ x, right, atol=1e-5)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", PEERS)
 def test_an_edit_takes_a_peer_by_name(name: str) -> None:
     """phi inside, the identity outside; and the kernel reads the same from a lattice of the peer's map."""
@@ -280,6 +279,7 @@ def test_methods_change_shells_alone() -> None:
 # -- folding and distortion --------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_peers_fold_under_large_turns_and_not_under_small_ones() -> None:
     for name in PEERS:
         small, large = (EDIT.rotate((0, 0, np.radians(deg))) for deg in (15, 90))

@@ -13,8 +13,6 @@ from cagefield.cameras.camera import Camera
 from cagefield.datasets import Dataset, View, load_dataset
 from cagefield.procedural import make_capture
 
-pytestmark = pytest.mark.nightly
-
 
 @pytest.fixture
 def dataset() -> Dataset:

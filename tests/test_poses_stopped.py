@@ -32,6 +32,7 @@ from cagefield.datasets.sfm.sfm_workspace import (
 from cagefield.datasets.sfm.structure_from_motion import make_poses
 from cagefield.errors import DatasetError
 from posed_photos import photos_alone
+from tiers import nightly_after_first
 
 pytest.importorskip("pycolmap", reason="poses are found by pycolmap")
 
@@ -146,7 +147,7 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
 }
 
 
-@pytest.mark.parametrize("name", DAMAGES)
+@pytest.mark.parametrize("name", nightly_after_first(DAMAGES))
 def test_a_database_that_is_damaged_after_a_stop_is_made_anew(
     stopped: Path, tmp_path: Path, name: str
 ) -> None:
@@ -161,13 +162,15 @@ def test_a_database_that_is_damaged_after_a_stop_is_made_anew(
 
 @pytest.mark.parametrize(
     ("name", "reason"),
-    [
-        ("cut off", "malformed"),
-        ("garbage", "file is not a database"),
-        ("empty", "no such table"),
-        ("head", ""),
-        ("zeros", ""),
-    ],
+    nightly_after_first(
+        [
+            ("cut off", "malformed"),
+            ("garbage", "file is not a database"),
+            ("empty", "no such table"),
+            ("head", ""),
+            ("zeros", ""),
+        ]
+    ),
 )
 def test_a_damaged_database_of_a_killed_run_is_made_anew(
     stopped: Path, tmp_path: Path, name: str, reason: str

@@ -47,6 +47,7 @@ def found(cache: Path, program: str) -> list[object]:
     return out
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(importlib.util.find_spec("torch") is None, reason="PyTorch is not installed")
 def test_kernels_start_without_pytorch_and_take_its_tensors_later(tmp_path: Path) -> None:
     loaded, by_array, by_tensor, kept = found(tmp_path, STARTED + TENSORS)

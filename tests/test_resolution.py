@@ -34,7 +34,7 @@ def test_the_factor_is_the_whole_number_nearest_to_the_side_that_the_time_allows
 
 
 def test_the_data_set_is_shrunk_from_whole_photos_and_said(tmp_path):
-    textured_capture(tmp_path, 4, size=(2000, 1500))
+    textured_capture(tmp_path, 2, size=(2000, 1500))
     found = shrink_to_training_resolution(load_dataset(tmp_path), 5.0)
     camera = found.train[0].camera
     assert (camera.width, camera.height) == (1000, 750) and found.train[0].load().shape == (750, 1000, 3)

@@ -9,7 +9,7 @@ there, to export, and to open a file that a page sends. Minutes of one processor
 
 With --short disks lack something else than bytes (`tests/robustness/shortages.py`): names, a quota of bytes
 or of names, or room that is missed only when files are closed; the last three are made by a library that is
-loaded before the C library, which needs a C compiler.
+loaded before the C library, which needs a C compiler. The exit status is 1 after a fault.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def main() -> None:
     if short.needs_library and not write_limits.is_loaded():
         if reason := write_limits.why_not():
             parser.error(reason)
-        command = [sys.executable, *sys.argv]
+        command = [sys.executable, "-m", "benchmarks.robustness.full_disks", *sys.argv[1:]]
         sys.exit(subprocess.run(command, env=os.environ | write_limits.preloading()).returncode)
     rows, everything = [], []
     with tempfile.TemporaryDirectory() as folder:
@@ -69,6 +69,7 @@ def main() -> None:
     rows.append(_row("**all**", "", total))
     if options.out is not None:
         options.out.write_text(_table(rows, options))
+    sys.exit(any(found.faults for found in everything))
 
 
 def _fill(name: str, source: Path, found: disks.Filled, levels: int, short: shortages.Shortage) -> int:

@@ -5,7 +5,7 @@ python -m benchmarks.robustness.soak [--hours 2] [--warm 15] [--pages 8] [--out 
 A real editor (`cagefield view`) of a small scene; the pages are programs that talk to it as a browser's do
 (`tests/robustness/soak.py`). All of them are there for `--warm` minutes first, until the history has as many
 entries as it may and all that is made once has been made; what is measured begins after that. The slopes are
-of the whole of it, by least squares.
+of the whole of it, by least squares. The exit status is 1 after a fault.
 """
 
 from __future__ import annotations
@@ -54,6 +54,7 @@ def main() -> None:
     print(text)
     if options.out is not None:
         options.out.write_text(text)
+    sys.exit(bool(soak.faults))
 
 
 def _run(

@@ -17,6 +17,8 @@ from disk_commands import DISK_COMMANDS, DiskCommand, sources
 from disks import BYTES, Filled, disk, room_for
 from shortages import PAGE, SHORTAGES
 
+from tiers import nightly_after_first
+
 
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
@@ -55,12 +57,13 @@ def test_a_command_on_a_disk_without_names(source: Path, name: str) -> None:
 
 
 @pytest.mark.skipif(write_limits.why_not() is not None, reason=str(write_limits.why_not()))
-@pytest.mark.parametrize("short", ["quota", "names of a quota", "closing"])
+@pytest.mark.parametrize("short", nightly_after_first(["closing", "quota", "names of a quota"]))
 def test_a_command_whose_writes_are_refused(source: Path, short: str) -> None:
     """In processes of their own: a library that counts what is written is loaded before the C library."""
-    script = Path(__file__).resolve().parents[2] / "benchmarks" / "robustness" / "full_disks.py"
+    root = Path(__file__).resolve().parents[2]
+    module = ["-m", "benchmarks.robustness.full_disks"]
     words = ["--short", short, "--levels", "3", "--only", "edit -o", "edit --overwrite"]
-    done = subprocess.run([sys.executable, str(script), *words], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, *module, *words], cwd=root, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     rows = [line.strip("| ").split(" | ") for line in done.stdout.splitlines()]
     assert [row[0] for row in rows] == ["edit -o", "edit --overwrite"], done.stdout

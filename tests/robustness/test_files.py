@@ -22,8 +22,10 @@ from readers import NEED_OPENSSL, NEED_TORCH, READERS
 from cagefield.edits import dump_edits, parse_edits
 from cagefield.errors import CagefieldError
 from cagefield.files import json_text, yaml_text
+from tiers import nightly_after_first
 
-INPUTS = 8
+INPUTS = 1
+"""Inputs of each reader with every change; nightly runs of the benchmark try 200."""
 
 
 @pytest.fixture(scope="module")
@@ -77,6 +79,7 @@ def test_what_took_memory_stays_cured() -> None:
     assert (found.refused, found.faults) == (1, [])
 
 
+@pytest.mark.nightly
 def test_archives_of_trainings_are_not_unpacked_beyond_their_size() -> None:
     """Checkpoints that unpack to 256 MiB, or that go on with a step below 0."""
     pytest.importorskip("torch", reason="these trainings are PyTorch's, which is not installed (extra nerf)")
@@ -97,20 +100,25 @@ def test_large_readers_are_known() -> None:
     assert set(LARGE_READERS) < set(READERS)
 
 
-@pytest.mark.parametrize("name", FOUND)
-def test_what_was_found_stays_cured(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [
+        parameters
+        for name, numbers in FOUND.items()
+        for parameters in nightly_after_first((name, number) for number in numbers)
+    ],
+)
+def test_what_was_found_stays_cured(tmp_path: Path, name: str, number: int) -> None:
     reader = READERS[name]
     reader.make(tmp_path)
     honest = {place: (tmp_path / place).read_bytes() for place in reader.damaged}
-    for number in FOUND[name]:
-        chance = random.Random(f" {name} {number}")
-        place = chance.choice(list(honest))
-        (tmp_path / place).write_bytes(mutators.mutate(reader.damaged[place], honest[place], chance))
-        try:
-            reader.read(tmp_path)
-        except CagefieldError as error:
-            assert len(str(error)) < 1000 and "\n" not in str(error)
-        (tmp_path / place).write_bytes(honest[place])
+    chance = random.Random(f" {name} {number}")
+    place = chance.choice(list(honest))
+    (tmp_path / place).write_bytes(mutators.mutate(reader.damaged[place], honest[place], chance))
+    try:
+        reader.read(tmp_path)
+    except CagefieldError as error:
+        assert len(str(error)) < 1000 and "\n" not in str(error)
 
 
 def test_most_damages_are_seen(outcomes: dict[str, Outcome]) -> None:

@@ -1,0 +1,14 @@
+"""Parameters of tests in tiers: the first with every change, the others in nightly runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import pytest
+
+
+def nightly_after_first(values: Iterable[Any]) -> list[Any]:
+    """Parameter sets of the values, tuples as several arguments; all but the first are nightly."""
+    sets = [value if isinstance(value, tuple) else (value,) for value in values]
+    return [pytest.param(*one, marks=pytest.mark.nightly if n else ()) for n, one in enumerate(sets)]
