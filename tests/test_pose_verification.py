@@ -77,7 +77,7 @@ def test_alignment_withstands_a_minority_of_wrong_poses():
     assert found.scale == pytest.approx(5.0, rel=1e-4)
     np.testing.assert_allclose(found.rotation, turn.T, atol=1e-5)
     good = [n for n in range(20) if n not in (3, 8, 15)]
-    np.testing.assert_allclose(found.moved(poses[good, :3, 3]), target[good, :3, 3], atol=1e-3)
+    np.testing.assert_allclose(found.transform_points(poses[good, :3, 3]), target[good, :3, 3], atol=1e-3)
 
 
 def test_unrelated_poses_are_not_aligned():
