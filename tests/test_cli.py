@@ -366,3 +366,12 @@ def test_make_scene_writes_captures_of_rooms(capsys: pytest.CaptureFixture[str],
     assert "holds out every 8th" in error
     assert "for rooms" in refused(capsys, "make-scene", "plant", "-o", tmp_path / "new", "--no-points")
     assert not (tmp_path / "new").exists()
+
+
+def test_benchmarks_are_those_of_a_checkout(monkeypatch, capsys):
+    """An installed package has none, and names the cure whatever follows `bench`."""
+    from cagefield.cli import bench
+
+    monkeypatch.setattr(bench, "bench_command", lambda: bench.Bench)
+    assert main(["bench", "edits", "--steps", "3"]) == 2
+    assert "part of the source checkout" in capsys.readouterr().err

@@ -108,6 +108,5 @@ def test_names_that_users_of_other_programs_look_for() -> None:
         "write_splats",
         "train_splat",
         "train_voxel",
-        "train_nerf",
     ]
     assert set(names) <= set(dir(cagefield))

@@ -51,8 +51,8 @@ RUNTIMES = {
 NEEDS_IMAGES = {"Dataset", "load_dataset", "read_splats", "train_splat", "train_voxel", "write_splats"}
 """Exports that read images, photos or splat files, and import Pillow or zstandard (SPZ)."""
 
-NEEDS_KERNELS = {"SplatRenderer", "train_nerf"}
-"""Exports that import a compute runtime: Numba for splats, PyTorch and Quadrants for NeRFs."""
+NEEDS_KERNELS = {"SplatRenderer"}
+"""Exports that import a compute runtime: Numba for splats."""
 
 
 def loaded_packages(code: str) -> set[str]:

@@ -23,6 +23,5 @@ from .rendering.reference_renderer import render_sampled as render_sampled
 from .rendering.splats.splat_renderer import SplatRenderer as SplatRenderer
 from .rendering.voxels.voxel_renderer import VoxelRenderer as VoxelRenderer
 from .scene.scene import Scene as Scene
-from .training.nerf.train_nerf import train_nerf as train_nerf
 from .training.splats.train_splats import train_splat as train_splat
 from .training.voxels.train_voxels import train_voxel as train_voxel

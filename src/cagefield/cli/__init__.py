@@ -80,6 +80,8 @@ def parse(args: list[str]) -> Command | int:
 
     # The benchmarks take a second to import, so only their own command line does.
     bench: Any = bench_command() if args[:1] == ["bench"] else Bench
+    if args[:1] == ["bench"] and bench is Bench:
+        return bench()
     commands = (
         Annotated[Demo, tyro.conf.subcommand("demo")]
         | Annotated[MakeScene, tyro.conf.subcommand("make-scene")]
