@@ -12,6 +12,7 @@ from typing import Any, TypedDict, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.edits import operations as ops
@@ -166,9 +167,9 @@ class Edit(ABC):
         """The edit with its inner cage moved by a vector [3]."""
         return self.then(ops.Translate(ops.displacement(by, "translate")))
 
-    def rotate(self: AnyEdit, theta: ArrayLike, *, axes: Axes = "world") -> AnyEdit:
-        """The edit with its inner cage turned about its pivot, intrinsic XYZ angles [3] in radians."""
-        return self.then(ops.Rotate.from_rotation(theta, axes))
+    def rotate(self: AnyEdit, rotation: Rotation | ArrayLike, *, axes: Axes = "world") -> AnyEdit:
+        """Edit with its inner cage turned about its pivot: SciPy `Rotation`, or XYZ angles [3], radians."""
+        return self.then(ops.Rotate.from_rotation(rotation, axes))
 
     def scale(self: AnyEdit, by: ArrayLike, *, axes: Axes = "world") -> AnyEdit:
         """The edit with its inner cage scaled about its pivot by one factor or three."""
