@@ -317,7 +317,7 @@ def test_a_folder_shows_its_coarse_level_while_the_rest_loads(
 def test_a_folder_on_a_disk_says_how_it_is_opened(tmp_path: Path) -> None:
     write_folder(tmp_path / "lumps", ScenePage.build(lumps_scene(), "lumps").folder())
     with shown((tmp_path / "lumps" / INDEX).as_uri()) as page:
-        until(page, "document.querySelector('.message').textContent.includes('open it by a web server')")
+        until(page, "document.querySelector('.message').textContent.includes('serve the folder')")
 
 
 def test_the_command_writes_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,5 +1,5 @@
-/** The scene's camera path: close stills, and what lies between two of them. */
-import { column, cross, matrix, minus, plus, dot, unit } from "./vectors";
+/** Camera path of an exported scene: closely spaced views, interpolated linearly. */
+import { column, cross, poseMatrix, subtract, add, dot, normalize } from "./vectors";
 
 export interface View {
   c2w: number[];
@@ -12,7 +12,7 @@ export interface Path {
   loop: boolean;
 }
 
-/** The view at a time; past the end of a path that is no loop, its last one. */
+/** The view at a time in seconds; after the end of a path without a loop, its last view. */
 export function viewAt({ stills, seconds, loop }: Path, time: number): View {
   const share = seconds > 0 ? time / seconds : 1;
   const last = stills.length - 1;
@@ -21,18 +21,20 @@ export function viewAt({ stills, seconds, loop }: Path, time: number): View {
   const other = stills[loop ? (Math.floor(at) + 1) % stills.length : Math.min(Math.floor(at) + 1, last)];
   const t = at - Math.floor(at);
   const mixed = (n: number): [number, number, number] =>
-    plus(column(one.c2w, n), minus(column(other.c2w, n), column(one.c2w, n)), t);
-  const back = unit(mixed(2));
+    add(column(one.c2w, n), subtract(column(other.c2w, n), column(one.c2w, n)), t);
+  const back = normalize(mixed(2));
   const up = mixed(1);
-  const level = unit(minus(up, [back[0] * dot(up, back), back[1] * dot(up, back), back[2] * dot(up, back)]));
+  const level = normalize(
+    subtract(up, [back[0] * dot(up, back), back[1] * dot(up, back), back[2] * dot(up, back)]),
+  );
   return {
-    c2w: matrix(cross(level, back), level, back, mixed(3)),
+    c2w: poseMatrix(cross(level, back), level, back, mixed(3)),
     fov_y_deg: one.fov_y_deg + t * (other.fov_y_deg - one.fov_y_deg),
   };
 }
 
-/** Between which two of rising times a moment lies, the first of them, and at which share of the way. */
-export function placeAt(times: Float32Array, seconds: number): { first: number; share: number } {
+/** The interval of rising times around a moment: the index of its start, and the share of it that has passed, in [0,1]. */
+export function intervalAt(times: Float32Array, seconds: number): { first: number; share: number } {
   const last = times.length - 1;
   let first = 0;
   while (first < last - 1 && times[first + 1] <= seconds) first++;

@@ -1,10 +1,10 @@
-/** The script of exported scenes: their viewer, and what tests and other pages need of it under one name. */
+/** Script of exported scenes: the viewer, and the renderers under one global name. */
 import { FieldRenderer } from "../field/field_renderer";
 import { readEdits } from "../field/page_edits";
 import { readEditsBeside } from "../splats/edits_reader";
 import { readSplatEdits } from "../splats/splat_edits";
 import { SplatRenderer } from "../splats/splat_renderer";
-import { take } from "./sources";
+import { takeBytes } from "./sources";
 import { SceneViewer } from "./viewer";
 import type { SceneHeader } from "./viewer";
 
@@ -14,9 +14,9 @@ interface ViewerApi {
   SplatRenderer: typeof SplatRenderer;
   readSplatEdits: typeof readSplatEdits;
   readEditsBeside: typeof readEditsBeside;
-  /** Takes parts of files that are in the page itself. */
-  take: typeof take;
-  /** The scene that the page shows. */
+  /** Takes chunks of embedded files. */
+  take: typeof takeBytes;
+  /** The viewer of the page. */
   viewer?: SceneViewer;
 }
 
@@ -26,25 +26,32 @@ declare global {
   }
 }
 
-window.cagefieldViewer = { FieldRenderer, readEdits, SplatRenderer, readSplatEdits, readEditsBeside, take };
+window.cagefieldViewer = {
+  FieldRenderer,
+  readEdits,
+  SplatRenderer,
+  readSplatEdits,
+  readEditsBeside,
+  take: takeBytes,
+};
 
-function element(selector: string): HTMLElement {
+function findElement(selector: string): HTMLElement {
   const found = document.querySelector<HTMLElement>(selector);
   if (!found) throw new Error(`the page has no ${selector}`);
   return found;
 }
 
 async function start(header: SceneHeader): Promise<void> {
-  const message = element(".message");
-  const bar = element(".arrived") as HTMLProgressElement;
+  const message = findElement(".message");
+  const bar = findElement(".arrived") as HTMLProgressElement;
   const say = (text: string): void => void (message.textContent = text);
   try {
-    const viewer = new SceneViewer(element("canvas") as HTMLCanvasElement, header, say, (share) => {
+    const viewer = new SceneViewer(findElement("canvas") as HTMLCanvasElement, header, say, (share) => {
       bar.value = share;
       bar.hidden = share >= 1;
     });
     window.cagefieldViewer.viewer = viewer;
-    const [compare, play, home] = [element(".compare"), element(".play"), element(".home")];
+    const [compare, play, home] = [findElement(".compare"), findElement(".play"), findElement(".home")];
     compare.hidden = !header.files.edits;
     compare.onclick = () => (viewer.edited = !viewer.edited);
     play.onclick = () => viewer.play(!viewer.plays);
@@ -56,7 +63,7 @@ async function start(header: SceneHeader): Promise<void> {
     }, 100);
     window.addEventListener("keydown", ({ key, target }) => {
       if (key === "b") compare.click();
-      // A button that has the focus takes the space itself.
+      // A focused button handles the space key itself.
       if (key === " " && !(target instanceof HTMLButtonElement)) play.click();
       if (key === "h") home.click();
     });

@@ -1,52 +1,52 @@
-/** A camera that turns about a point, shifts and comes nearer; no browser. */
-import { column, cross, dot, length, matrix, minus, plus, times, turned, unit } from "./vectors";
+/** Orbit camera: rotation about a center, panning and zoom. World units. */
+import { column, cross, dot, length, poseMatrix, subtract, add, scale, rotate, normalize } from "./vectors";
 import type { Vec3 } from "./vectors";
 
-/** Nearest to looking straight up or down, radians. */
-const LIMIT = 0.02;
+/** Smallest angle between the view axis and the vertical, radians. */
+const MIN_POLE_ANGLE = 0.02;
 
 export class Orbit {
   eye: Vec3;
   target: Vec3;
 
-  /** `c2w` row by row; the orbit's centre is the point of its axis next to `around`. */
+  /** `c2w` row by row; the orbit's center is the point of the camera's axis closest to `around`. */
   constructor(
     c2w: readonly number[],
     private readonly up: Vec3,
     around: Vec3,
   ) {
     this.eye = column(c2w, 3);
-    const forward = times(column(c2w, 2), -1);
-    this.target = plus(this.eye, forward, Math.max(dot(minus(around, this.eye), forward), 1e-3));
+    const forward = scale(column(c2w, 2), -1);
+    this.target = add(this.eye, forward, Math.max(dot(subtract(around, this.eye), forward), 1e-3));
   }
 
-  /** Camera to world, row by row. */
+  /** Camera-to-world matrix, row by row. */
   get c2w(): number[] {
-    const back = unit(minus(this.eye, this.target));
-    const right = unit(cross(this.up, back));
-    return matrix(right, cross(back, right), back, this.eye);
+    const back = normalize(subtract(this.eye, this.target));
+    const right = normalize(cross(this.up, back));
+    return poseMatrix(right, cross(back, right), back, this.eye);
   }
 
-  /** Turns about the centre by angles to the right and downwards. */
+  /** Rotates about the center by angles in radians, to the right and downwards. */
   turn(across: number, down: number): void {
-    const away = turned(minus(this.eye, this.target), this.up, -across);
-    const right = unit(cross(this.up, away));
-    const angle = Math.acos(Math.max(-1, Math.min(1, dot(unit(away), this.up))));
-    const by = Math.max(LIMIT, Math.min(Math.PI - LIMIT, angle - down)) - angle;
-    this.eye = plus(this.target, turned(away, right, by));
+    const offset = rotate(subtract(this.eye, this.target), this.up, -across);
+    const right = normalize(cross(this.up, offset));
+    const angle = Math.acos(Math.max(-1, Math.min(1, dot(normalize(offset), this.up))));
+    const change = Math.max(MIN_POLE_ANGLE, Math.min(Math.PI - MIN_POLE_ANGLE, angle - down)) - angle;
+    this.eye = add(this.target, rotate(offset, right, change));
   }
 
-  /** Shifts by shares of the picture's height, with the tangent of half its vertical field of view. */
+  /** Pans by shares of the image height; `tangent` is that of half the vertical field of view. */
   shift(across: number, down: number, tangent: number): void {
-    const far = 2 * tangent * length(minus(this.eye, this.target));
+    const height = 2 * tangent * length(subtract(this.eye, this.target));
     const { c2w } = this;
-    const by = plus(times(column(c2w, 0), -across * far), column(c2w, 1), down * far);
-    this.eye = plus(this.eye, by);
-    this.target = plus(this.target, by);
+    const motion = add(scale(column(c2w, 0), -across * height), column(c2w, 1), down * height);
+    this.eye = add(this.eye, motion);
+    this.target = add(this.target, motion);
   }
 
-  /** Multiplies the distance to the centre. */
-  zoom(by: number): void {
-    this.eye = plus(this.target, minus(this.eye, this.target), by);
+  /** Multiplies the distance to the center by a factor. */
+  zoom(factor: number): void {
+    this.eye = add(this.target, subtract(this.eye, this.target), factor);
   }
 }

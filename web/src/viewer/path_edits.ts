@@ -1,4 +1,4 @@
-/** The edits along a camera path: states, and what lies between two of them (see `cagefield.pages.page_path`). */
+/** Edits along a camera path: states at times, and interpolation between two of them (see `cagefield.pages.page_path`). */
 import { EDIT_LAYOUT } from "../field/layout";
 import { joined } from "../field/level";
 import type { Vec3 } from "../field/level";
@@ -6,16 +6,17 @@ import { ByteReader, PageFile } from "../field/page_file";
 import type { Lattice, PageEdits } from "../field/page_edits";
 import { readLayer } from "../field/page_layers";
 import type { Layer, PlacedLayer } from "../field/page_layers";
-import { mixedHalves } from "./float16";
-import { placeAt } from "./camera_path";
+import { mixFloat16 } from "./float16";
+import { intervalAt } from "./camera_path";
 
 interface PathHeader {
   edits: number[];
   boxes: number[];
-  /** Of each state, which lattices its edits have; and how many there are. */
+  /** For each state, the numbers of its lattices. */
   lattices: number[][];
+  /** Number of lattices in the file. */
   stored: number;
-  /** Of each state, [layer, place, first, end] of those that its edits have (see `PlacedLayer`); and their keys. */
+  /** For each state, [layer, place, first, end] of its layers (see `PlacedLayer`). */
   layers: [number, number, number, number][][];
   layer_keys: string[];
   preserve_opacity: boolean;
@@ -34,7 +35,7 @@ interface State {
 const { BOX_ROWS, BOX_VECTOR, EDIT_ROWS, HEXAHEDRON, HEXAHEDRON_ROWS, Y_BOX_VECTOR } = EDIT_LAYOUT;
 
 /** First rows of the boxes of an edit, whose union is taken between two states: its own, and those of its hexahedra. */
-const EDIT_BOXES = [BOX_VECTOR, HEXAHEDRON + Y_BOX_VECTOR, HEXAHEDRON + HEXAHEDRON_ROWS + Y_BOX_VECTOR];
+const EDIT_BOX_ROWS = [BOX_VECTOR, HEXAHEDRON + Y_BOX_VECTOR, HEXAHEDRON + HEXAHEDRON_ROWS + Y_BOX_VECTOR];
 
 export class PathEdits {
   private constructor(
@@ -77,20 +78,20 @@ export class PathEdits {
     return new PathEdits(header, times, order, occupancy, states);
   }
 
-  /** The edits at seconds from the path's begin. */
+  /** The edits at a time in seconds from the start of the path. */
   at(seconds: number): PageEdits {
     const { order, states } = this;
-    const { first, share } = placeAt(this.times, seconds);
+    const { first, share } = intervalAt(this.times, seconds);
     const one = states[order[first]];
     const other = states[order[first + 1]];
     const near = share < 0.5 ? one : other;
-    if (one === other || !alike(one, other)) return this.edits(near, near.rows, near.lattices);
+    if (one === other || !haveSameKinds(one, other)) return this.edits(near, near.rows, near.lattices);
     const lattices = one.lattices.map((lattice, n) => {
       if (lattice === other.lattices[n]) return lattice;
       const key = `${lattice.key} ${other.lattices[n].key} ${share}`;
-      return { key, halves: mixedHalves(lattice.halves, other.lattices[n].halves, share) };
+      return { key, halves: mixFloat16(lattice.halves, other.lattices[n].halves, share) };
     });
-    return this.edits(one, mixedRows(one, other, share), lattices);
+    return this.edits(one, interpolateRows(one, other, share), lattices);
   }
 
   private edits({ edits, boxes, layers }: State, rows: Float32Array, lattices: Lattice[]): PageEdits {
@@ -106,20 +107,25 @@ export class PathEdits {
   }
 }
 
-/** Whether two states have the same kinds of edits: the fourth numbers of their rows say of which kind they are. */
-function alike(one: State, other: State): boolean {
+/** Whether two states have the same kinds of edits: the fourth numbers of the rows state the kinds. */
+function haveSameKinds(one: State, other: State): boolean {
   if (one.edits !== other.edits || one.boxes !== other.boxes) return false;
   for (let n = 3; n < one.rows.length; n += 4) if (one.rows[n] !== other.rows[n]) return false;
   return true;
 }
 
-function mixedRows({ edits, boxes, rows }: State, { rows: others }: State, share: number): Float32Array {
+/** Rows between those of two states; boxes contain the boxes of both. */
+function interpolateRows(
+  { edits, boxes, rows }: State,
+  { rows: others }: State,
+  share: number,
+): Float32Array {
   const out = rows.map((value, n) => value + share * (others[n] - value));
   const unite = (low: number): void => {
     for (let n = 4 * low; n < 4 * low + 3; n++) out[n] = Math.min(rows[n], others[n]);
     for (let n = 4 * low + 4; n < 4 * low + 7; n++) out[n] = Math.max(rows[n], others[n]);
   };
-  for (let e = 0; e < edits; e++) for (const low of EDIT_BOXES) unite(e * EDIT_ROWS + low);
+  for (let e = 0; e < edits; e++) for (const low of EDIT_BOX_ROWS) unite(e * EDIT_ROWS + low);
   for (let b = 0; b < boxes; b++) unite(edits * EDIT_ROWS + BOX_ROWS * b);
   return out;
 }

@@ -1,11 +1,11 @@
-/** The files of an exported scene: beside the page, or in the page itself, which the browser reads from its begin. */
+/** Files of an exported scene: beside the page, or embedded in the page as scripts, which arrive one after the other. */
 import type { Bytes } from "../field/page_file";
 
 export type FileName = "field" | "edits" | "path";
 
 export interface FileEntry {
   bytes: number;
-  /** Relative to the page; none where the file is in the page. */
+  /** Address relative to the page; absent for an embedded file. */
   url?: string;
 }
 
@@ -16,7 +16,7 @@ interface Feed {
 
 const feeds = new Map<FileName, Feed>();
 
-function feedOf(name: FileName): Feed {
+function feedFor(name: FileName): Feed {
   let feed = feeds.get(name);
   if (!feed) {
     let controller: ReadableStreamDefaultController<Bytes> | undefined;
@@ -27,31 +27,31 @@ function feedOf(name: FileName): Feed {
   return feed;
 }
 
-/** Takes the next part of a file from a script in the page, in base64; null is its end. The script is let go of. */
-export function take(name: FileName, text: string | null): void {
+/** Takes the next chunk of an embedded file, in base64, from a script of the page, and removes the script; null ends the file. */
+export function takeBytes(name: FileName, text: string | null): void {
   document.currentScript?.remove();
-  const { controller } = feedOf(name);
+  const { controller } = feedFor(name);
   try {
     if (text === null) controller.close();
-    else controller.enqueue(bytesOf(text));
+    else controller.enqueue(decodeBase64(text));
   } catch {
-    // Nobody reads the file any more.
+    // The reader of the file has stopped.
   }
 }
 
-function bytesOf(text: string): Bytes {
+function decodeBase64(text: string): Bytes {
   const raw = atob(text);
   const bytes = new Uint8Array(raw.length);
   for (let n = 0; n < raw.length; n++) bytes[n] = raw.charCodeAt(n);
   return bytes;
 }
 
-/** The bytes of a file, as they come. */
-export async function open(name: FileName, { url }: FileEntry): Promise<ReadableStream<Bytes>> {
-  if (url === undefined) return feedOf(name).stream;
+/** The bytes of a file, as a stream. */
+export async function openFile(name: FileName, { url }: FileEntry): Promise<ReadableStream<Bytes>> {
+  if (url === undefined) return feedFor(name).stream;
   if (location.protocol === "file:")
     throw new Error(
-      "A page may not read files beside it from a disk: open it by a web server (python -m http.server), or export one .html file.",
+      "A browser does not let a page read files beside it on a disk: serve the folder (python -m http.server), or export a single .html file.",
     );
   const answer = await fetch(url);
   if (!answer.ok || answer.body === null)
@@ -59,7 +59,7 @@ export async function open(name: FileName, { url }: FileEntry): Promise<Readable
   return answer.body;
 }
 
-/** The whole of a stream. */
-export async function whole(stream: ReadableStream<Bytes>): Promise<ArrayBuffer> {
+/** All bytes of a stream. */
+export async function readAll(stream: ReadableStream<Bytes>): Promise<ArrayBuffer> {
   return await new Response(stream).arrayBuffer();
 }

@@ -1,17 +1,17 @@
-/** The edits of splats along a camera path (see `cagefield.pages.page_splat_path`). */
+/** Edits of splats along a camera path (see `cagefield.pages.page_splat_path`). */
 import type { Vec3 } from "../field/level";
 import { ByteReader, PageFile } from "../field/page_file";
 import { axesOf, covariancesOf, rotationOf } from "../splats/shapes";
 import { changedRecords, unpackedBits } from "../splats/splat_edits";
 import type { SplatEdits } from "../splats/splat_edits";
 import { wholes } from "../splats/splat_file";
-import { placeAt } from "./camera_path";
+import { intervalAt } from "./camera_path";
 
-export const SPLAT_PATH = "cagesppa";
+export const SPLAT_PATH_MAGIC = "cagesppa";
 
 interface Header {
   count: number;
-  /** Of each state: how many splats it changes, and which of the lists it has. */
+  /** For each state: the number of changed splats, and the numbers of its arrays in the file. */
   changed: number[];
   hidden: number[];
   sources: number[];
@@ -19,7 +19,7 @@ interface Header {
   scales: number[];
   opacities: number[];
   gains: number[];
-  /** The state whose numbers a state's are differences to, or -1. */
+  /** For each state, the state that its `moves` are differences to; -1 for none. */
   after: number[];
   low: Vec3;
   step: number;
@@ -30,7 +30,7 @@ interface Header {
 
 type List = "hidden" | "sources" | "rotations" | "scales" | "opacities" | "gains";
 
-/** A state as it came: [12, M] of `moves`, see the format. */
+/** A state of M splats as the file has it, with `moves` [12, M]. */
 interface State {
   hidden: Uint8Array;
   sources: Int32Array;
@@ -40,7 +40,7 @@ interface State {
   moves: Uint16Array;
 }
 
-/** What splats are before the edits: axes [M, 9], made when they are first asked for. */
+/** Shapes of splats before the edits: axes [M, 9], computed at the first use. */
 class Shapes {
   private made: Float32Array | null = null;
 
@@ -55,14 +55,14 @@ class Shapes {
   }
 }
 
-interface Unpacked {
+interface SplatGeometry {
   means: Float32Array<ArrayBuffer>;
   covariances: Float32Array<ArrayBuffer>;
 }
 
 export class SplatPath {
-  /** The states that were shown last, two at most. */
-  private readonly unpacked = new Map<State, Unpacked>();
+  /** Geometry of the states used last, at most two. */
+  private readonly geometry = new Map<State, SplatGeometry>();
 
   private constructor(
     private readonly header: Header,
@@ -72,7 +72,7 @@ export class SplatPath {
   ) {}
 
   static async read(source: ArrayBuffer): Promise<SplatPath> {
-    const file = await PageFile.open<Header>(new ByteReader(source), SPLAT_PATH, 2);
+    const file = await PageFile.open<Header>(new ByteReader(source), SPLAT_PATH_MAGIC, 2);
     const { header } = file;
     const times = (await file.read("times")) as Float32Array;
     const order = (await file.read("states")) as Uint16Array;
@@ -82,7 +82,7 @@ export class SplatPath {
     const pairs = (name: List, n: number): Uint16Array => wholes(list(name, n) as Uint8Array);
     const states: State[] = [];
     for (const n of header.changed.keys()) {
-      // Arrays come in the order in which states first have them.
+      // The file has each array where a state first needs it.
       for (const name of ["hidden", "sources", "rotations", "scales", "opacities", "gains"] as const) {
         const key = `${name}.${header[name][n]}`;
         if (!lists.has(key)) lists.set(key, (await file.read(key)) as Uint8Array | Int32Array);
@@ -97,28 +97,28 @@ export class SplatPath {
         shapes: shapes.get(key)!,
         opacities: pairs("opacities", n),
         gains: list("gains", n) as Int32Array,
-        moves: unfolded(wholes((await file.read(`moves.${n}`)) as Uint8Array), before),
+        moves: undoDifferences(wholes((await file.read(`moves.${n}`)) as Uint8Array), before),
       });
     }
     return new SplatPath(header, times, order, states);
   }
 
-  /** The edits at seconds from the path's begin; null where they have gone all the way. */
+  /** The edits at a time in seconds from the start of the path; null where the edits are complete. */
   at(seconds: number): SplatEdits | null {
     const { order, states, header } = this;
-    const { first, share } = placeAt(this.times, seconds);
+    const { first, share } = intervalAt(this.times, seconds);
     const [one, other] = [order[first], order[first + 1]];
     const near = share < 0.5 ? one : other;
     if ((one === other || share === 0 || share === 1) && near === header.whole) return null;
     const state = states[near];
-    let { means, covariances } = this.numbers(state);
+    let { means, covariances } = this.geometryOf(state);
     if (one !== other) {
       const far = states[near === one ? other : one];
-      const away = near === one ? share : 1 - share;
-      const partners = partnersOf(state.sources, far.sources);
-      const others = this.numbers(far);
-      means = mixed(means, others.means, partners, 3, away);
-      covariances = mixed(covariances, others.covariances, partners, 6, away);
+      const weight = near === one ? share : 1 - share;
+      const matches = matchIndices(state.sources, far.sources);
+      const farGeometry = this.geometryOf(far);
+      means = interpolateRows(means, farGeometry.means, matches, 3, weight);
+      covariances = interpolateRows(covariances, farGeometry.covariances, matches, 6, weight);
     }
     const count = state.sources.length;
     const records = changedRecords(
@@ -138,19 +138,19 @@ export class SplatPath {
     };
   }
 
-  private numbers(state: State): Unpacked {
-    let found = this.unpacked.get(state);
+  private geometryOf(state: State): SplatGeometry {
+    let found = this.geometry.get(state);
     if (!found) {
-      found = unpack(state, this.header);
-      for (const old of this.unpacked.keys()) if (this.unpacked.size > 1) this.unpacked.delete(old);
-      this.unpacked.set(state, found);
+      found = decodeGeometry(state, this.header);
+      for (const old of this.geometry.keys()) if (this.geometry.size > 1) this.geometry.delete(old);
+      this.geometry.set(state, found);
     }
     return found;
   }
 }
 
-/** Of rising numbers, where the k-th of each value is among others; -1 where it is not. */
-export function partnersOf(own: Int32Array, others: Int32Array): Int32Array {
+/** Indices [N] of rising numbers in other rising numbers, equal values matched in order; -1 without a match. */
+export function matchIndices(own: Int32Array, others: Int32Array): Int32Array {
   const out = new Int32Array(own.length).fill(-1);
   let m = 0;
   for (let n = 0; n < own.length; n++) {
@@ -160,31 +160,31 @@ export function partnersOf(own: Int32Array, others: Int32Array): Int32Array {
   return out;
 }
 
-/** Rows of so many numbers, a share of the way to those of their partners. */
-function mixed(
+/** Rows of `width` numbers, interpolated by a share towards their matches in `others`; rows without a match stay. */
+function interpolateRows(
   rows: Float32Array,
   others: Float32Array,
-  partners: Int32Array,
+  matches: Int32Array,
   width: number,
   share: number,
 ): Float32Array<ArrayBuffer> {
   const out = Float32Array.from(rows);
-  for (let n = 0; n < partners.length; n++) {
-    if (partners[n] < 0) continue;
+  for (let n = 0; n < matches.length; n++) {
+    if (matches[n] < 0) continue;
     for (let k = 0; k < width; k++)
-      out[width * n + k] += share * (others[width * partners[n] + k] - out[width * n + k]);
+      out[width * n + k] += share * (others[width * matches[n] + k] - out[width * n + k]);
   }
   return out;
 }
 
-/** Numbers of 16 bits from their folded differences to others, in place; see `page_splat_path`. */
-export function unfolded(folded: Uint16Array, before: Uint16Array | null): Uint16Array {
+/** 16-bit numbers from their zigzag-coded differences to others, in place; see `page_splat_path`. */
+export function undoDifferences(folded: Uint16Array, before: Uint16Array | null): Uint16Array {
   for (let n = 0; n < folded.length; n++)
     folded[n] = (before === null ? 0 : before[n]) + ((folded[n] >>> 1) ^ -(folded[n] & 1));
   return folded;
 }
 
-function unpack({ moves, shapes }: State, { low, step, stretch }: Header): Unpacked {
+function decodeGeometry({ moves, shapes }: State, { low, step, stretch }: Header): SplatGeometry {
   const count = moves.length / 12;
   const means = new Float32Array(3 * count);
   const { axes } = shapes;
@@ -202,7 +202,7 @@ function unpack({ moves, shapes }: State, { low, step, stretch }: Header): Unpac
 
 type Numbers = number[] | Float32Array;
 
-/** Puts the product of two matrices [3, 3] into `out`; all begin where it is said. */
+/** Writes the product of two matrices [3, 3] into `out`; each matrix begins at an offset. */
 function multiply<Out extends Numbers>(
   out: Out,
   at: number,

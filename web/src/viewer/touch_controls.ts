@@ -1,11 +1,16 @@
-/** Mouse and touch on a canvas: one finger or the left button turns, two fingers shift and pinch. */
+/** Mouse and touch controls of a canvas: one finger or the left button orbits, two fingers pan and pinch. */
 
-export interface Moves {
-  /** By pixels. */
+/** Change of the logarithm of the distance, per pixel of the wheel. */
+const ZOOM_PER_WHEEL_PIXEL = 0.0012;
+const PIXELS_PER_WHEEL_LINE = 30;
+
+export interface CameraMoves {
+  /** Orbits by pixels. */
   turn(x: number, y: number): void;
+  /** Pans by pixels. */
   shift(x: number, y: number): void;
-  /** By a factor of the distance. */
-  zoom(by: number): void;
+  /** Multiplies the distance to the orbit's center. */
+  zoom(factor: number): void;
 }
 
 interface Point {
@@ -13,68 +18,71 @@ interface Point {
   y: number;
 }
 
-interface Finger {
-  /** Where it is, and where it was when it was last followed. */
-  at: Point;
-  from: Point;
-  /** Another button, or Shift: it shifts. */
+/** A finger on the canvas, or a pressed mouse button. */
+interface PressedPointer {
+  position: Point;
+  /** The position up to which the pointer's motion has been applied. */
+  applied: Point;
+  /** Whether the pointer pans: another button than the left one, or Shift. */
   shifts: boolean;
 }
 
-const between = (a: Point, b: Point): number => Math.hypot(a.x - b.x, a.y - b.y);
+const distance = (a: Point, b: Point): number => Math.hypot(a.x - b.x, a.y - b.y);
 
-export function listen(canvas: HTMLCanvasElement, moves: Moves): void {
-  const fingers = new Map<number, Finger>();
-  let waiting = false;
+/** Applies the motion of all pointers together: with two fingers, each event states the motion of one alone. */
+function applyMotion(pointers: PressedPointer[], moves: CameraMoves): void {
+  if (pointers.length === 0) return;
+  const leading = pointers.slice(0, 2);
+  const meanMotion = (axis: "x" | "y"): number =>
+    leading.reduce((sum, { position, applied }) => sum + position[axis] - applied[axis], 0) / leading.length;
+  const [x, y] = [meanMotion("x"), meanMotion("y")];
+  const moved = x !== 0 || y !== 0;
+  const [first, second] = leading;
+  if (leading.length === 2) {
+    if (moved) moves.shift(x, y);
+    const before = distance(first.applied, second.applied);
+    const after = distance(first.position, second.position);
+    if (before > 1 && after > 1 && before !== after) moves.zoom(before / after);
+  } else if (moved && first.shifts) moves.shift(x, y);
+  else if (moved) moves.turn(x, y);
+  for (const pointer of pointers) pointer.applied = pointer.position;
+}
 
-  /** Follows all fingers at once: of two, each event tells of one alone. */
-  const follow = (): void => {
-    const held = [...fingers.values()];
-    if (held.length === 0) return;
-    const two = held.slice(0, 2);
-    const mean = (axis: "x" | "y"): number =>
-      two.reduce((sum, { at, from }) => sum + at[axis] - from[axis], 0) / two.length;
-    const [x, y] = [mean("x"), mean("y")];
-    if (two.length === 2 || two[0].shifts) {
-      if (x !== 0 || y !== 0) moves.shift(x, y);
-    } else if (x !== 0 || y !== 0) moves.turn(x, y);
-    if (two.length === 2) {
-      const [before, after] = [between(two[0].from, two[1].from), between(two[0].at, two[1].at)];
-      if (before > 1 && after > 1 && before !== after) moves.zoom(before / after);
-    }
-    for (const finger of held) finger.from = finger.at;
-  };
-
+export function listenForMoves(canvas: HTMLCanvasElement, moves: CameraMoves): void {
+  const pointers = new Map<number, PressedPointer>();
+  const apply = (): void => applyMotion([...pointers.values()], moves);
+  let scheduled = false;
   canvas.style.touchAction = "none";
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
-    follow();
-    const at = { x: event.clientX, y: event.clientY };
-    fingers.set(event.pointerId, { at, from: at, shifts: event.button !== 0 || event.shiftKey });
+    apply();
+    const position = { x: event.clientX, y: event.clientY };
+    const shifts = event.button !== 0 || event.shiftKey;
+    pointers.set(event.pointerId, { position, applied: position, shifts });
   });
   for (const name of ["pointerup", "pointercancel"] as const)
     canvas.addEventListener(name, (event) => {
-      follow();
-      fingers.delete(event.pointerId);
+      apply();
+      pointers.delete(event.pointerId);
     });
   canvas.addEventListener("pointermove", (event) => {
-    const finger = fingers.get(event.pointerId);
-    if (!finger) return;
-    finger.at = { x: event.clientX, y: event.clientY };
-    if (waiting) return;
-    waiting = true;
+    const pointer = pointers.get(event.pointerId);
+    if (!pointer) return;
+    pointer.position = { x: event.clientX, y: event.clientY };
+    if (scheduled) return;
+    scheduled = true;
     requestAnimationFrame(() => {
-      waiting = false;
-      follow();
+      scheduled = false;
+      apply();
     });
   });
   canvas.addEventListener(
     "wheel",
     (event) => {
       event.preventDefault();
-      const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 30 : 1;
-      moves.zoom(Math.exp(0.0012 * lines * event.deltaY));
+      const pixels = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? PIXELS_PER_WHEEL_LINE : 1;
+      moves.zoom(Math.exp(ZOOM_PER_WHEEL_PIXEL * pixels * event.deltaY));
     },
     { passive: false },
   );

@@ -1,60 +1,60 @@
-/** Viewer of an exported scene: field and edits, with orbit, before/after and the camera path, without a server. */
+/** Viewer of an exported scene: its field and edits, with orbit, before/after and the camera path; it needs no server. */
 import { AdaptiveResolution, waitForGpu } from "../field/adaptive_resolution";
 import type { SceneDrawer } from "../field/scene_drawer";
 import { createDrawer, identifyScene, readMagic } from "../splats/drawer_selection";
-import { listen } from "./touch_controls";
-import { Orbit } from "./orbit";
 import { viewAt } from "./camera_path";
 import type { Path, View } from "./camera_path";
+import { Orbit } from "./orbit";
 import { PathEdits } from "./path_edits";
-import { open, whole } from "./sources";
+import { openFile, readAll } from "./sources";
 import type { FileEntry } from "./sources";
-import { SPLAT_PATH, SplatPath } from "./splat_path";
+import { SPLAT_PATH_MAGIC, SplatPath } from "./splat_path";
+import { listenForMoves } from "./touch_controls";
 import type { Vec3 } from "./vectors";
 
-/** Description of a scene in an exported page. */
+/** Description of the scene in an exported page; `pages.scene_page` writes it. */
 export interface SceneHeader {
   start: View;
   up: Vec3;
   centre: Vec3;
   background: Vec3 | null;
   path: Path | null;
-  /** `edits`: the edits of the scene; `path`: the edits at moments of the camera path. */
+  /** `edits`: those of the scene. `path`: the edits along the camera path. */
   files: { field: FileEntry; edits?: FileEntry; path?: FileEntry };
 }
 
-/** Milliseconds after the last motion until a complete frame is drawn. */
+/** Milliseconds after the last motion until the complete frame is drawn. */
 const SETTLE_MS = 120;
-const MAX_PIXELS_PER_POINT = 2;
+const MAX_DEVICE_PIXEL_RATIO = 2;
 const MIN_FRAME_PIXELS = 8;
 
 export class SceneViewer {
-  /** The renderer of the scene's kind; null until the first bytes of the field file have arrived. */
+  /** The renderer of the scene's kind; null before the first bytes of the scene. */
   renderer: SceneDrawer | null = null;
   orbit: Orbit;
   private readonly gl: WebGL2RenderingContext;
   private readonly resolution = new AdaptiveResolution();
   private fov: number;
-  private moved = performance.now();
-  /** The next row of the complete frame; null once the complete frame is shown. */
-  private row: number | null = 0;
-  /** Whether the current view has been shown at least at a low resolution; the complete frame comes after that. */
-  private sketched = false;
+  private changedAt = performance.now();
+  /** The next row of the complete frame; null once the frame is shown. */
+  private nextRow: number | null = 0;
+  /** Whether a moving frame of the current view has been shown: the complete frame is drawn only then. */
+  private previewed = false;
   /** Number of frames shown. */
   pictures = 0;
-  private playing: number | null = null;
-  /** The scene's edits; undefined until they are loaded. */
-  private edits: unknown;
+  private playStart: number | null = null;
+  /** The scene's edits; undefined while they are being loaded. */
+  private edits: unknown = undefined;
   private showsEdits = true;
-  /** The edits at moments of the camera path. */
-  private along: PathEdits | SplatPath | null = null;
+  /** The edits along the camera path; null without them. */
+  private pathEdits: PathEdits | SplatPath | null = null;
   canPlay = false;
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
     private readonly header: SceneHeader,
     private readonly say: (text: string) => void,
-    private readonly arrived: (share: number) => void = () => undefined,
+    private readonly progressed: (share: number) => void = () => undefined,
   ) {
     const gl = canvas.getContext("webgl2", {
       alpha: false,
@@ -62,63 +62,63 @@ export class SceneViewer {
       depth: false,
       powerPreference: "high-performance",
     });
-    if (!gl) throw new Error("This browser has no WebGL2, which the scene is drawn with.");
+    if (!gl) throw new Error("This browser has no WebGL2, which the scene needs.");
     this.gl = gl;
     this.orbit = new Orbit(header.start.c2w, header.up, header.centre);
     this.fov = header.start.fov_y_deg;
-    listen(canvas, {
+    listenForMoves(canvas, {
       turn: (x, y) =>
         this.change(() =>
           this.orbit.turn((Math.PI * x) / canvas.clientHeight, (Math.PI * y) / canvas.clientHeight),
         ),
       shift: (x, y) =>
-        this.change(() => this.orbit.shift(x / canvas.clientHeight, y / canvas.clientHeight, this.tangent)),
-      zoom: (by) => this.change(() => this.orbit.zoom(by)),
+        this.change(() =>
+          this.orbit.shift(x / canvas.clientHeight, y / canvas.clientHeight, this.halfTangent),
+        ),
+      zoom: (factor) => this.change(() => this.orbit.zoom(factor)),
     });
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
-    canvas.addEventListener(
-      "webglcontextrestored",
-      () => void this.renderer?.restore().then(() => this.touch()),
-    );
-    new ResizeObserver(() => this.touch()).observe(canvas);
+    canvas.addEventListener("webglcontextrestored", () => {
+      void this.renderer?.restore().then(() => this.invalidate());
+    });
+    new ResizeObserver(() => this.invalidate()).observe(canvas);
   }
 
-  /** Loads the scene, coarse level first, and draws it from then on. */
+  /** Loads the scene, coarse level first, and draws each level as it arrives. */
   async run(): Promise<void> {
-    const { files } = this.header;
-    void this.draw();
-    const { kind, source } = await identifyScene(await open("field", files.field));
+    const { files, background } = this.header;
+    void this.drawFrames();
+    const { kind, source } = await identifyScene(await openFile("field", files.field));
     const renderer = (this.renderer = createDrawer(kind, this.gl));
-    renderer.background = this.header.background ?? [1, 1, 1];
+    renderer.background = background ?? [1, 1, 1];
     renderer.edited = this.showsEdits;
     let edits: Promise<void> | undefined;
     await renderer.load(source, {
-      onArrival: (bytes) => this.arrived(Math.min(0.99, bytes / files.field.bytes)),
+      onArrival: (bytes) => this.progressed(Math.min(0.99, bytes / files.field.bytes)),
       onLevel: (number, count) => {
         this.say(number < count ? "Loading detail …" : "");
         edits ??= this.loadEdits(renderer);
-        this.touch();
+        this.invalidate();
       },
     });
     await edits;
-    if (files.path) this.along = await readPath(await whole(await open("path", files.path)));
+    if (files.path) this.pathEdits = await readPath(await readAll(await openFile("path", files.path)));
     this.canPlay = this.header.path !== null;
-    this.arrived(1);
+    this.progressed(1);
   }
 
-  /** Loads the scene's edits, after the first level of the field. */
+  /** Loads the scene's edits, after the first level. */
   private async loadEdits(renderer: SceneDrawer): Promise<void> {
     const { files } = this.header;
-    this.edits = files.edits
-      ? await renderer.readEdits(await whole(await open("edits", files.edits)), null)
-      : null;
+    const file = files.edits && (await readAll(await openFile("edits", files.edits)));
+    this.edits = file ? await renderer.readEdits(file, null) : null;
     renderer.setEdits(this.edits);
-    this.touch();
+    this.invalidate();
   }
 
   /** Whether the complete frame of the current view is shown. */
   get whole(): boolean {
-    return this.row === null;
+    return this.nextRow === null;
   }
 
   get edited(): boolean {
@@ -127,23 +127,23 @@ export class SceneViewer {
 
   set edited(on: boolean) {
     this.showsEdits = on;
-    if (this.renderer) this.renderer.edited = on;
-    this.touch();
+    if (this.renderer !== null) this.renderer.edited = on;
+    this.invalidate();
   }
 
   get plays(): boolean {
-    return this.playing !== null;
+    return this.playStart !== null;
   }
 
-  /** Plays the camera path from its start, or stops the playback. */
+  /** Plays the camera path from its start, or stops. */
   play(on: boolean): void {
-    this.playing = on && this.canPlay ? performance.now() : null;
-    this.touch();
+    this.playStart = on && this.canPlay ? performance.now() : null;
+    this.invalidate();
   }
 
-  /** Returns to the first view of the scene, with the complete edits. */
+  /** Shows the view in which the scene opens, with its complete edits. */
   home(): void {
-    this.playing = null;
+    this.playStart = null;
     if (this.edits !== undefined) this.renderer?.setEdits(this.edits);
     this.look(this.header.start);
   }
@@ -151,37 +151,38 @@ export class SceneViewer {
   /** Shows a moment of the camera path. */
   seek(path: Path, seconds: number): void {
     const time = path.loop ? seconds % path.seconds : Math.min(seconds, path.seconds);
-    if (this.along) this.renderer?.setEdits(this.along.at(time) ?? this.edits ?? null);
+    if (this.pathEdits) this.renderer?.setEdits(this.pathEdits.at(time) ?? this.edits ?? null);
     this.look(viewAt(path, time));
   }
 
-  private get tangent(): number {
+  private get halfTangent(): number {
     return Math.tan((this.fov * Math.PI) / 360);
   }
 
   private look(view: View): void {
     this.orbit = new Orbit(view.c2w, this.header.up, this.header.centre);
     this.fov = view.fov_y_deg;
-    this.touch();
+    this.invalidate();
   }
 
   private change(action: () => void): void {
-    this.playing = null;
+    this.playStart = null;
     action();
-    this.touch();
+    this.invalidate();
   }
 
-  private touch(): void {
-    this.moved = performance.now();
-    this.row = 0;
-    this.sketched = false;
+  private invalidate(): void {
+    this.changedAt = performance.now();
+    this.nextRow = 0;
+    this.previewed = false;
   }
 
-  private async draw(): Promise<void> {
+  private async drawFrames(): Promise<void> {
     for (;;) {
       await new Promise((done) => requestAnimationFrame(done));
       try {
-        await this.frame();
+        this.advance();
+        if (this.renderer !== null) await this.draw(this.renderer);
       } catch (error) {
         this.say(error instanceof Error ? error.message : String(error));
         return;
@@ -189,55 +190,58 @@ export class SceneViewer {
     }
   }
 
-  private async frame(): Promise<void> {
-    const { canvas, gl, renderer, resolution } = this;
+  /** Moves on along the camera path while it plays. */
+  private advance(): void {
     const { path } = this.header;
-    if (this.playing !== null && path) {
-      const time = (performance.now() - this.playing) / 1000;
-      this.seek(path, time);
-      if (!path.loop && time >= path.seconds) this.playing = null;
-    }
-    // The full level is not shown before its edits are loaded.
-    if (renderer === null || this.row === null || (renderer.level?.last && this.edits === undefined)) return;
-    const dense = Math.min(devicePixelRatio, MAX_PIXELS_PER_POINT);
+    if (this.playStart === null || !path) return;
+    const time = (performance.now() - this.playStart) / 1000;
+    this.seek(path, time);
+    if (!path.loop && time >= path.seconds) this.playStart = null;
+  }
+
+  /** Draws a moving frame after a change, and bands of the complete frame once the view is still. */
+  private async draw(renderer: SceneDrawer): Promise<void> {
+    const { canvas, gl, resolution } = this;
+    // The finest level is not shown before its edits are loaded.
+    if (this.nextRow === null || (renderer.level?.last && this.edits === undefined)) return;
+    const ratio = Math.min(devicePixelRatio, MAX_DEVICE_PIXEL_RATIO);
     const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((n) =>
-      Math.max(1, Math.round(n * dense)),
+      Math.max(1, Math.round(n * ratio)),
     );
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     const scale = resolution.scale(width, height);
-    const still = (this.sketched && performance.now() - this.moved > SETTLE_MS) || scale === 1;
-    const size = still
+    const isStill = (this.previewed && performance.now() - this.changedAt > SETTLE_MS) || scale === 1;
+    const [across, down] = isStill
       ? [width, height]
       : [width, height].map((n) => Math.max(MIN_FRAME_PIXELS, Math.round(n * scale)));
-    this.aim(renderer, size[0], size[1]);
-    const first = still ? this.row : 0;
-    const count =
-      still && renderer.inBands ? Math.min(resolution.bandRows(width, height), height - first) : size[1];
-    const moved = this.moved;
-    const sorted = performance.now() - moved > SETTLE_MS;
+    this.setCamera(renderer, across, down);
+    const first = isStill ? this.nextRow : 0;
+    const isBand = isStill && renderer.inBands;
+    const count = isBand ? Math.min(resolution.bandRows(width, height), height - first) : down;
+    const { changedAt } = this;
+    const sorted = performance.now() - changedAt > SETTLE_MS;
     if (!renderer.render({ rows: { first, count }, sorted })) return;
-    const whole = first + count >= size[1];
-    if (whole) {
+    const isComplete = first + count >= down;
+    if (isComplete) {
       renderer.show(width, height);
       this.pictures++;
     }
-    resolution.record(size[0] * count, await waitForGpu(gl));
-    if (this.moved !== moved) return;
-    this.sketched = true;
-    // Splats in the depth order of an earlier camera are drawn anew.
-    if (still) this.row = !whole ? first + count : renderer.inOrder ? null : 0;
+    resolution.record(across * count, await waitForGpu(gl));
+    if (this.changedAt !== changedAt) return;
+    this.previewed = true;
+    // Splats that were in an older depth order are drawn again.
+    if (isStill) this.nextRow = !isComplete ? first + count : renderer.inOrder ? null : 0;
   }
 
-  private aim(renderer: SceneDrawer, width: number, height: number): void {
-    const focal = (0.5 * Math.min(width, height)) / this.tangent;
-    const [cx, cy] = [width / 2, height / 2];
+  private setCamera(renderer: SceneDrawer, width: number, height: number): void {
+    const focal = (0.5 * Math.min(width, height)) / this.halfTangent;
+    const { c2w } = this.orbit;
     renderer.setSize(width, height);
-    renderer.setCamera({ c2w: this.orbit.c2w, width, height, fx: focal, fy: focal, cx, cy });
+    renderer.setCamera({ c2w, width, height, fx: focal, fy: focal, cx: width / 2, cy: height / 2 });
   }
 }
 
 async function readPath(file: ArrayBuffer): Promise<PathEdits | SplatPath> {
-  return readMagic(new Uint8Array(file)) === SPLAT_PATH
-    ? await SplatPath.read(file)
-    : await PathEdits.read(file);
+  const magic = readMagic(new Uint8Array(file));
+  return magic === SPLAT_PATH_MAGIC ? await SplatPath.read(file) : await PathEdits.read(file);
 }
