@@ -33,7 +33,10 @@ export function viewAt({ stills, seconds, loop }: Path, time: number): View {
   };
 }
 
-/** The interval of rising times around a moment: the index of its start, and the share of it that has passed, in [0,1]. */
+/**
+ * The interval of rising times around a moment: the index of its start, and the share of it that has passed,
+ * in [0,1].
+ */
 export function intervalAt(times: Float32Array, seconds: number): { first: number; share: number } {
   const last = times.length - 1;
   let first = 0;

@@ -1,4 +1,7 @@
-/** Edits along a camera path: states at times, and interpolation between two of them (see `cagefield.pages.page_path`). */
+/**
+ * Edits along a camera path: states at times, and interpolation between two of them (see
+ * `cagefield.pages.page_path`).
+ */
 import { EDIT_LAYOUT } from "../field/layout";
 import { joined } from "../field/level";
 import type { Vec3 } from "../field/level";
@@ -34,7 +37,10 @@ interface State {
 
 const { BOX_ROWS, BOX_VECTOR, EDIT_ROWS, HEXAHEDRON, HEXAHEDRON_ROWS, Y_BOX_VECTOR } = EDIT_LAYOUT;
 
-/** First rows of the boxes of an edit, whose union is taken between two states: its own, and those of its hexahedra. */
+/**
+ * First rows of the boxes of an edit, whose union is taken between two states: its own, and those of its
+ * hexahedra.
+ */
 const EDIT_BOX_ROWS = [BOX_VECTOR, HEXAHEDRON + Y_BOX_VECTOR, HEXAHEDRON + HEXAHEDRON_ROWS + Y_BOX_VECTOR];
 
 export class PathEdits {

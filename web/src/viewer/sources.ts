@@ -1,4 +1,7 @@
-/** Files of an exported scene: beside the page, or embedded in the page as scripts, which arrive one after the other. */
+/**
+ * Files of an exported scene: beside the page, or embedded in the page as scripts, which arrive one after the
+ * other.
+ */
 import type { Bytes } from "../field/page_file";
 
 export type FileName = "field" | "edits" | "path";
@@ -27,7 +30,10 @@ function feedFor(name: FileName): Feed {
   return feed;
 }
 
-/** Takes the next chunk of an embedded file, in base64, from a script of the page, and removes the script; null ends the file. */
+/**
+ * Takes the next chunk of an embedded file, in base64, from a script of the page, and removes the script;
+ * null ends the file.
+ */
 export function takeBytes(name: FileName, text: string | null): void {
   document.currentScript?.remove();
   const { controller } = feedFor(name);

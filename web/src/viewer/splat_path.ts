@@ -149,7 +149,9 @@ export class SplatPath {
   }
 }
 
-/** Indices [N] of rising numbers in other rising numbers, equal values matched in order; -1 without a match. */
+/**
+ * Indices [N] of rising numbers in other rising numbers, equal values matched in order; -1 without a match.
+ */
 export function matchIndices(own: Int32Array, others: Int32Array): Int32Array {
   const out = new Int32Array(own.length).fill(-1);
   let m = 0;
@@ -160,7 +162,10 @@ export function matchIndices(own: Int32Array, others: Int32Array): Int32Array {
   return out;
 }
 
-/** Rows of `width` numbers, interpolated by a share towards their matches in `others`; rows without a match stay. */
+/**
+ * Rows of `width` numbers, interpolated by a share towards their matches in `others`; rows without a match
+ * stay.
+ */
 function interpolateRows(
   rows: Float32Array,
   others: Float32Array,

@@ -29,7 +29,9 @@ interface PressedPointer {
 
 const distance = (a: Point, b: Point): number => Math.hypot(a.x - b.x, a.y - b.y);
 
-/** Applies the motion of all pointers together: with two fingers, each event states the motion of one alone. */
+/**
+ * Applies the motion of all pointers together: with two fingers, each event states the motion of one alone.
+ */
 function applyMotion(pointers: PressedPointer[], moves: CameraMoves): void {
   if (pointers.length === 0) return;
   const leading = pointers.slice(0, 2);

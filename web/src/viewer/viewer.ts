@@ -1,4 +1,7 @@
-/** Viewer of an exported scene: its field and edits, with orbit, before/after and the camera path; it needs no server. */
+/**
+ * Viewer of an exported scene: its field and edits, with orbit, before/after and the camera path; it needs no
+ * server.
+ */
 import { AdaptiveResolution, waitForGpu } from "../field/adaptive_resolution";
 import type { SceneDrawer } from "../field/scene_drawer";
 import { createDrawer, identifyScene, readMagic } from "../splats/drawer_selection";
