@@ -4,13 +4,13 @@ import {
   EDGES,
   FACES,
   FACE_NAMES,
-  axesOf,
-  cornersOf,
-  extent,
+  edgeDirections,
+  partCorners,
+  halfExtent,
   faceNormal,
-  middle,
-  orientation,
-  same,
+  centroid,
+  nearestRotation,
+  haveSameCorners,
 } from "../src/editing/cage";
 import { box, expectClose } from "./cages";
 
@@ -29,29 +29,29 @@ describe("a cage's parts", () => {
   });
 
   it("knows the corners of each kind of part", () => {
-    expect(cornersOf({ kind: "corner", index: 5 })).toEqual([5]);
-    expect(cornersOf({ kind: "edge", index: 0 })).toEqual([0, 1]);
-    expect(cornersOf({ kind: "face", index: 2 })).toEqual([2, 3, 6, 7]);
+    expect(partCorners({ kind: "corner", index: 5 })).toEqual([5]);
+    expect(partCorners({ kind: "edge", index: 0 })).toEqual([0, 1]);
+    expect(partCorners({ kind: "face", index: 2 })).toEqual([2, 3, 6, 7]);
   });
 });
 
 describe("a cage's frame", () => {
   it("is the rotation of a turned box", () => {
-    expect(orientation(box([1, 2, 3], [1, 2, 3], turn)).angleTo(turn)).toBeLessThan(1e-9);
+    expect(nearestRotation(box([1, 2, 3], [1, 2, 3], turn)).angleTo(turn)).toBeLessThan(1e-9);
   });
 
   it("of a sheared box is the nearest rotation: no other of many is nearer to the axes", () => {
     const sheared = box([0, 0, 0], [1, 1, 1]).map(([x, y, z]) => [x + 0.6 * y, y, z]) as ReturnType<
       typeof box
     >;
-    const axes = axesOf(sheared).elements;
+    const axes = edgeDirections(sheared).elements;
     const distance = (q: Quaternion): number => {
       const columns = [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1)].flatMap((v) =>
         v.applyQuaternion(q).toArray(),
       );
       return Math.hypot(...columns.map((x, i) => x - axes[i]));
     };
-    const best = orientation(sheared);
+    const best = nearestRotation(sheared);
     for (let n = 0; n < 50; n++) {
       const axis = new Vector3(Math.sin(n), Math.cos(3 * n), Math.sin(7 * n)).normalize();
       const other = best.clone().multiply(new Quaternion().setFromAxisAngle(axis, 0.05));
@@ -61,7 +61,7 @@ describe("a cage's frame", () => {
 
   it("has unit axes along its edges", () => {
     const x = new Vector3(1, 0, 0).applyQuaternion(turn);
-    expectClose(axesOf(box([0, 0, 0], [3, 2, 1], turn)).elements.slice(0, 3), x.toArray());
+    expectClose(edgeDirections(box([0, 0, 0], [3, 2, 1], turn)).elements.slice(0, 3), x.toArray());
   });
 
   it("has outward face normals", () => {
@@ -71,14 +71,14 @@ describe("a cage's frame", () => {
   });
 
   it("measures its middle and its size", () => {
-    expectClose(middle(box([1, 2, 3], [1, 1, 1])), [1, 2, 3]);
-    expectClose(middle(box([0, 0, 0], [2, 2, 2]), [1, 3, 5, 7]), [1, 0, 0]);
-    expect(extent(box([0, 0, 0], [1, 2, 3], turn))).toBeCloseTo(1, 9);
+    expectClose(centroid(box([1, 2, 3], [1, 1, 1])), [1, 2, 3]);
+    expectClose(centroid(box([0, 0, 0], [2, 2, 2]), [1, 3, 5, 7]), [1, 0, 0]);
+    expect(halfExtent(box([0, 0, 0], [1, 2, 3], turn))).toBeCloseTo(1, 9);
   });
 
   it("is the same as another but for rounding", () => {
     const cage = box([0, 0, 0], [1, 1, 1]);
-    expect(same(cage, box([1e-8, 0, 0], [1, 1, 1]))).toBe(true);
-    expect(same(cage, box([1e-3, 0, 0], [1, 1, 1]))).toBe(false);
+    expect(haveSameCorners(cage, box([1e-8, 0, 0], [1, 1, 1]))).toBe(true);
+    expect(haveSameCorners(cage, box([1e-3, 0, 0], [1, 1, 1]))).toBe(false);
   });
 });

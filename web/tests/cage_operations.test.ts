@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import cases from "../../tests/fixtures/cage_operations.json";
-import { apply, part } from "../src/editing/operations";
+import { apply, scaleOperation } from "../src/editing/operations";
 import type { Operation, Posed } from "../src/editing/operations";
 import { expectClose } from "./cages";
 
@@ -28,7 +28,7 @@ describe("operations on cages, as Python applies them", () => {
     "$name",
     ({ each }) => {
       expectCage(apply(each.operation, each.cage), each.expected);
-      expectCage(apply(part(each.operation, each.share), each.cage), each.expected_share);
+      expectCage(apply(scaleOperation(each.operation, each.share), each.cage), each.expected_share);
     },
   );
 });

@@ -45,7 +45,7 @@ describe("a drag", () => {
   it("takes the server's corners over, and expects the same limit of the next move", () => {
     const { server, drag } = begin();
     drag.move(by(0.4));
-    drag.answered(server.answer(0.5, box([0.2, 0, 0], [0.6, 0.6, 0.6]), "the shell folds"));
+    drag.takeAnswer(server.answer(0.5, box([0.2, 0, 0], [0.6, 0.6, 0.6]), "the shell folds"));
     expectClose(drag.shown.deformed.corners[0], [-0.1, -0.3, -0.3]);
     expectClose(drag.shown.deformed.pivot, [0.2, 0, 0]);
     expect(drag.why).toBe("the shell folds");
@@ -60,7 +60,7 @@ describe("a drag", () => {
     drag.move(by(0.1));
     const older = server.answer(1, box([0.1, 0, 0], [0.6, 0.6, 0.6]), null);
     drag.move(by(0.2));
-    drag.answered(older);
+    drag.takeAnswer(older);
     expectClose(drag.shown.deformed.corners[0], [-0.1, -0.3, -0.3]);
   });
 

@@ -31,7 +31,7 @@ afterEach(() => {
 function pacing() {
   const store = new Store();
   const [send, show, say, recordServerFrame, orbitAt] = [vi.fn(), vi.fn(), vi.fn(), vi.fn(), vi.fn()];
-  const guessed: (() => void)[] = [];
+  const orbitGuessed: (() => void)[] = [];
   const afterFrame: ((time: number) => void)[] = [];
   const facts = {
     superseded: false,
@@ -48,7 +48,7 @@ function pacing() {
     supersedes: () => facts.superseded,
     isDragging: () => facts.dragging,
     viewport: {
-      guessed,
+      orbitGuessed,
       afterFrame,
       frameTime: FRAME_MS,
       invalidate: vi.fn(),
@@ -71,7 +71,7 @@ function pacing() {
     say,
     recordServerFrame,
     orbitAt,
-    guessed,
+    orbitGuessed,
     facts,
     pacer,
     /** Redraws the canvas: requests the next frames, then the drawn ones are on the screen. */
@@ -142,7 +142,7 @@ describe("frame pacing", () => {
   });
 
   it("takes the orbit's center from the depth of the next frame, only inside the field", async () => {
-    const { guessed, facts, store, orbitAt, deliver } = pacing();
+    const { orbitGuessed, facts, store, orbitAt, deliver } = pacing();
     const bounds = [
       [0, 0, 0],
       [1, 1, 1],
@@ -152,11 +152,11 @@ describe("frame pacing", () => {
       facts.camera = camera;
       await deliver({ ...PICTURE, camera });
     };
-    guessed.forEach((call) => call());
+    orbitGuessed.forEach((call) => call());
     await frame(4);
     expect(orbitAt).not.toHaveBeenCalled();
     facts.position = [0.5, 0.5, 0.5];
-    guessed.forEach((call) => call());
+    orbitGuessed.forEach((call) => call());
     await deliver({ ...PICTURE, camera: 4 });
     expect(orbitAt).not.toHaveBeenCalled();
     await frame(5);

@@ -1,6 +1,6 @@
 import { Quaternion, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { containedPart, contains, expectedPart } from "../src/editing/limits";
+import { containedShare, contains, expectedShare } from "../src/editing/limits";
 import type { Corners } from "../src/net/protocol";
 import { box } from "./cages";
 
@@ -32,21 +32,21 @@ describe("whether a cage contains a point", () => {
 
 describe("how far a drag may go", () => {
   it("is the gap between the cages, of a translation", () => {
-    expect(containedPart({ kind: "translate", by: [1, 0, 0] }, inner, outer)).toBeCloseTo(0.5, 2);
-    expect(containedPart({ kind: "translate", by: [0.4, 0, 0] }, inner, outer)).toBe(1);
+    expect(containedShare({ kind: "translate", by: [1, 0, 0] }, inner, outer)).toBeCloseTo(0.5, 2);
+    expect(containedShare({ kind: "translate", by: [0.4, 0, 0] }, inner, outer)).toBe(1);
   });
 
   it("is found for a turn that would be inside again at its end", () => {
     const tight = box([0, 0, 0], [0.65, 0.65, 0.65]);
     // a cube of .6 turned by t about z reaches .3 (cos t + sin t) <= .325 up to t = 4.98 degrees
-    const share = containedPart({ kind: "rotate", rotation_deg: [0, 0, 60], axes: "world" }, inner, tight);
+    const share = containedShare({ kind: "rotate", rotation_deg: [0, 0, 60], axes: "world" }, inner, tight);
     expect(share * 60).toBeGreaterThan(4.8);
     expect(share * 60).toBeLessThan(5.0);
   });
 
   it("is everything without an outer cage, and where the start is outside already", () => {
-    expect(containedPart({ kind: "translate", by: [9, 0, 0] }, inner, null)).toBe(1);
-    expect(containedPart({ kind: "translate", by: [9, 0, 0] }, inner, box([5, 0, 0], [1, 1, 1]))).toBe(1);
+    expect(containedShare({ kind: "translate", by: [9, 0, 0] }, inner, null)).toBe(1);
+    expect(containedShare({ kind: "translate", by: [9, 0, 0] }, inner, box([5, 0, 0], [1, 1, 1]))).toBe(1);
   });
 
   it("is guessed from what the server let through", () => {
@@ -54,9 +54,9 @@ describe("how far a drag may go", () => {
       operation: { kind: "translate" as const, by: [1, 0, 0] as [number, number, number] },
       part: 0.5,
     };
-    expect(expectedPart({ kind: "translate", by: [2, 0, 0] }, last)).toBeCloseTo(0.25, 12);
-    expect(expectedPart({ kind: "translate", by: [0.4, 0, 0] }, last)).toBe(1);
-    expect(expectedPart({ kind: "rotate", rotation_deg: [0, 0, 9] }, last)).toBe(1);
-    expect(expectedPart({ kind: "translate", by: [2, 0, 0] }, null)).toBe(1);
+    expect(expectedShare({ kind: "translate", by: [2, 0, 0] }, last)).toBeCloseTo(0.25, 12);
+    expect(expectedShare({ kind: "translate", by: [0.4, 0, 0] }, last)).toBe(1);
+    expect(expectedShare({ kind: "rotate", rotation_deg: [0, 0, 9] }, last)).toBe(1);
+    expect(expectedShare({ kind: "translate", by: [2, 0, 0] }, null)).toBe(1);
   });
 });

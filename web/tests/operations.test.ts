@@ -1,14 +1,14 @@
 import { Quaternion, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
 import {
-  amount,
+  operationSize,
   apply,
-  degrees,
-  described,
-  lengthStep,
-  part,
-  quaternion,
-  snapped,
+  degreesFromQuaternion,
+  describeOperation,
+  snapLength,
+  scaleOperation,
+  quaternionFromDegrees,
+  snapOperation,
   type Operation,
 } from "../src/editing/operations";
 import { box, expectClose } from "./cages";
@@ -30,7 +30,7 @@ describe("operations on a cage", () => {
 
   it("turn it right-handed about its pivot, intrinsic XYZ", () => {
     // R_x(90) R_y(90) takes z to R_x x = x, x to R_x (-z) = y
-    const q = quaternion([90, 90, 0]);
+    const q = quaternionFromDegrees([90, 90, 0]);
     expectClose(new Vector3(0, 0, 1).applyQuaternion(q).toArray(), [1, 0, 0]);
     expectClose(new Vector3(1, 0, 0).applyQuaternion(q).toArray(), [0, 1, 0]);
     const after = apply({ kind: "rotate", rotation_deg: [0, 0, 90], axes: "world" }, cage);
@@ -81,15 +81,15 @@ describe("a share of an operation", () => {
     { kind: "move_corners", corners: [3], by: [0.1, 0, 0] },
   ];
   it.each(all)("$kind: nothing at 0, all of it at 1, half the amount at a half", (operation) => {
-    expect(amount(part(operation, 0))).toBeCloseTo(0, 6);
-    apply(part(operation, 1), cage).corners.forEach((c, k) =>
+    expect(operationSize(scaleOperation(operation, 0))).toBeCloseTo(0, 6);
+    apply(scaleOperation(operation, 1), cage).corners.forEach((c, k) =>
       expectClose(c, apply(operation, cage).corners[k]),
     );
-    expect(amount(part(operation, 0.5))).toBeCloseTo(0.5 * amount(operation), 6);
+    expect(operationSize(scaleOperation(operation, 0.5))).toBeCloseTo(0.5 * operationSize(operation), 6);
   });
 
   it("of a rotation, done twice, is the rotation", () => {
-    const half = part({ kind: "rotate", rotation_deg: [20, 50, -70], axes: "world" }, 0.5);
+    const half = scaleOperation({ kind: "rotate", rotation_deg: [20, 50, -70], axes: "world" }, 0.5);
     const twice = apply(half, apply(half, cage)).corners;
     twice.forEach((c, k) =>
       expectClose(c, apply({ kind: "rotate", rotation_deg: [20, 50, -70], axes: "world" }, cage).corners[k]),
@@ -100,30 +100,30 @@ describe("a share of an operation", () => {
 describe("numbers", () => {
   it("snap to whole steps", () => {
     const steps = { length: 0.1, angle: 15, factor: 0.25 };
-    expect(snapped({ kind: "translate", by: [0.26, -0.04, 1] }, steps)).toEqual({
+    expect(snapOperation({ kind: "translate", by: [0.26, -0.04, 1] }, steps)).toEqual({
       kind: "translate",
       by: [0.3, 0, 1],
     });
-    expect(snapped({ kind: "rotate", rotation_deg: [0, 22, 0], axes: "world" }, steps)).toMatchObject({
+    expect(snapOperation({ kind: "rotate", rotation_deg: [0, 22, 0], axes: "world" }, steps)).toMatchObject({
       rotation_deg: [0, 15, 0],
     });
-    expect(snapped({ kind: "scale", by: [0.01, 1.2, 1], axes: "cage" }, steps)).toMatchObject({
+    expect(snapOperation({ kind: "scale", by: [0.01, 1.2, 1], axes: "cage" }, steps)).toMatchObject({
       by: [0.25, 1.25, 1],
     });
   });
 
   it("has a step of round length for cages of every size", () => {
-    expect(lengthStep(1)).toBeCloseTo(0.1, 12);
-    expect(lengthStep(0.6)).toBeCloseTo(0.05, 12);
-    expect(lengthStep(30)).toBeCloseTo(1, 12);
+    expect(snapLength(1)).toBeCloseTo(0.1, 12);
+    expect(snapLength(0.6)).toBeCloseTo(0.05, 12);
+    expect(snapLength(30)).toBeCloseTo(1, 12);
   });
 
   it("goes from angles to a quaternion and back", () => {
-    expectClose(degrees(quaternion([10, -20, 30])), [10, -20, 30]);
+    expectClose(degreesFromQuaternion(quaternionFromDegrees([10, -20, 30])), [10, -20, 30]);
   });
 
   it("reads as text", () => {
-    expect(described({ kind: "translate", by: [0.1, -0, 2] })).toBe("0.100  0.000  2.000");
-    expect(described({ kind: "rotate", rotation_deg: [0, 12.34, 0] })).toBe("0.0°  12.3°  0.0°");
+    expect(describeOperation({ kind: "translate", by: [0.1, -0, 2] })).toBe("0.100  0.000  2.000");
+    expect(describeOperation({ kind: "rotate", rotation_deg: [0, 12.34, 0] })).toBe("0.0°  12.3°  0.0°");
   });
 });

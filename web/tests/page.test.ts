@@ -1,19 +1,19 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import { Connection, socketAddress, type Handlers, type Socket } from "../src/net/connection";
-import { HELD, bindings, named } from "../src/editing/keys";
+import { MOUSE_BINDINGS, bindings, keyName } from "../src/editing/keys";
 import { Latency } from "../src/frames/latency";
 import { cageOverlay } from "../src/editing/cage_overlay";
 import {
-  LOOKING,
-  START,
+  READ_ONLY_NOTICE,
+  INITIAL,
   Store,
-  awaited,
-  fillable,
-  maySay,
-  obstacle,
-  relightable,
-  selected,
-  target,
+  preparationText,
+  canFill,
+  maySend,
+  dragObstacle,
+  canRelight,
+  selectedEdit,
+  dragTarget,
 } from "../src/app/store";
 import { Actions } from "../src/editing/actions";
 import type { App } from "../src/app/app";
@@ -84,39 +84,41 @@ describe("the store", () => {
   });
 
   it("knows what a drag moves", () => {
-    const now = { ...START, state: state() };
-    expect(selected(now)?.id).toBe(1);
-    expect(target(now)).toBe("field");
-    expect(target({ ...now, mode: "set", cage: "both" })).toBe("both");
+    const now = { ...INITIAL, state: state() };
+    expect(selectedEdit(now)?.id).toBe(1);
+    expect(dragTarget(now)).toBe("field");
+    expect(dragTarget({ ...now, mode: "set", cage: "both" })).toBe("both");
     expect(
-      target({ ...now, mode: "set", cage: "outer", state: state({ edits: [edit({ outer: null })] }) }),
+      dragTarget({ ...now, mode: "set", cage: "outer", state: state({ edits: [edit({ outer: null })] }) }),
     ).toBe("inner");
   });
 
   it("says what whole pictures wait for", () => {
     const preparing = { type: "preparing", done: 0, of: 4 } as const;
-    const quick = { ...START.figures, width: 200, final: false };
+    const quick = { ...INITIAL.figures, width: 200, final: false };
     const filled = state({ edits: [edit({ fill: "surroundings" })] });
     const plain = state({ edits: [edit({ fill: "none", relight: "none" })] });
-    expect(awaited({ ...START, preparing, state: filled })).toContain("Preparing the renderer 1/4");
-    expect(awaited({ ...START, preparing, state: filled, figures: quick })).toContain("Working out");
-    expect(awaited({ ...START, preparing, state: plain, figures: quick })).toContain(
+    expect(preparationText({ ...INITIAL, preparing, state: filled })).toContain("Preparing the renderer 1/4");
+    expect(preparationText({ ...INITIAL, preparing, state: filled, figures: quick })).toContain(
+      "Computing fill and light",
+    );
+    expect(preparationText({ ...INITIAL, preparing, state: plain, figures: quick })).toContain(
       "Preparing the renderer 1/4",
     );
-    expect(awaited({ ...START, preparing, state: filled, figures: { ...quick, final: true } })).toContain(
-      "Preparing",
-    );
     expect(
-      awaited({ ...START, preparing: { ...preparing, done: 4 }, state: filled, figures: quick }),
+      preparationText({ ...INITIAL, preparing, state: filled, figures: { ...quick, final: true } }),
+    ).toContain("Preparing");
+    expect(
+      preparationText({ ...INITIAL, preparing: { ...preparing, done: 4 }, state: filled, figures: quick }),
     ).toBeNull();
-    expect(awaited(START)).toBeNull();
+    expect(preparationText(INITIAL)).toBeNull();
   });
 
   it("knows what can be filled, and what light can go along with", () => {
     const hello = { splats: false } as Hello;
     const kinds = (["continuous", "move", "copy", "delete"] as const).map((kind) => {
-      const now = { ...START, hello, state: state({ edits: [edit({ kind })] }) };
-      return [fillable(now), relightable(now)];
+      const now = { ...INITIAL, hello, state: state({ edits: [edit({ kind })] }) };
+      return [canFill(now), canRelight(now)];
     });
     expect(kinds).toEqual([
       [false, true],
@@ -125,36 +127,36 @@ describe("the store", () => {
       [true, true],
     ]);
     const splats = {
-      ...START,
+      ...INITIAL,
       hello: { splats: true } as Hello,
       state: state({ edits: [edit({ kind: "delete" })] }),
     };
-    expect([fillable(splats), relightable(splats)]).toEqual([true, true]);
-    expect([fillable(START), relightable(START)]).toEqual([false, false]);
+    expect([canFill(splats), canRelight(splats)]).toEqual([true, true]);
+    expect([canFill(INITIAL), canRelight(INITIAL)]).toEqual([false, false]);
   });
 
   it("knows what a page may say that may look alone", () => {
-    const looker = { ...START, hello: { read_only: true } as Hello };
+    const looker = { ...INITIAL, hello: { read_only: true } as Hello };
     const question = { type: "ask", request: 1, what: "path" } as PageMessage;
     const change = { type: "change", edit: 1, name: "mine" } as PageMessage;
-    expect([maySay(looker, question), maySay(looker, change)]).toEqual([true, false]);
-    expect([maySay(START, question), maySay(START, change)]).toEqual([true, true]);
-    expect(obstacle(looker, edit())).toBe(LOOKING);
+    expect([maySend(looker, question), maySend(looker, change)]).toEqual([true, false]);
+    expect([maySend(INITIAL, question), maySend(INITIAL, change)]).toEqual([true, true]);
+    expect(dragObstacle(looker, edit())).toBe(READ_ONLY_NOTICE);
   });
 
   it("says why an edit cannot be dragged", () => {
-    expect(obstacle(START, edit())).toBeNull();
-    expect(obstacle(START, edit({ locked: true }))).toMatch(/locked/);
-    expect(obstacle({ ...START, mode: "set" }, edit({ enabled: false }))).toMatch(/hidden/);
-    expect(obstacle(START, edit({ kind: "delete" }))).toMatch(/nothing to move/);
-    expect(obstacle({ ...START, mode: "set" }, edit({ kind: "delete" }))).toBeNull();
+    expect(dragObstacle(INITIAL, edit())).toBeNull();
+    expect(dragObstacle(INITIAL, edit({ locked: true }))).toMatch(/locked/);
+    expect(dragObstacle({ ...INITIAL, mode: "set" }, edit({ enabled: false }))).toMatch(/hidden/);
+    expect(dragObstacle(INITIAL, edit({ kind: "delete" }))).toMatch(/nothing to move/);
+    expect(dragObstacle({ ...INITIAL, mode: "set" }, edit({ kind: "delete" }))).toBeNull();
   });
 });
 
 describe("what is drawn", () => {
   const eye: [number, number, number] = [0, -5, 0];
   it("is both cages of the selected edit, with a dot on each corner and on faces that look this way", () => {
-    const { segments, dots } = cageOverlay({ ...START, state: state() }, null, [], eye);
+    const { segments, dots } = cageOverlay({ ...INITIAL, state: state() }, null, [], eye);
     expect(segments).toHaveLength(24);
     expect(dots.filter((dot) => dot.shape === "round")).toHaveLength(8);
     expect(dots.filter((dot) => dot.shape === "square")).toHaveLength(1);
@@ -162,29 +164,29 @@ describe("what is drawn", () => {
 
   it("is where the inner cage was, too, once it has moved; and both cages' handles in Set mode", () => {
     const moved = edit({ deformed: edit().inner.map(([x, y, z]) => [x + 0.1, y, z]) as never });
-    expect(cageOverlay({ ...START, state: state({ edits: [moved] }) }, null, [], eye).segments).toHaveLength(
-      36,
-    );
-    expect(cageOverlay({ ...START, state: state(), mode: "set" }, null, [], eye).dots).toHaveLength(18);
+    expect(
+      cageOverlay({ ...INITIAL, state: state({ edits: [moved] }) }, null, [], eye).segments,
+    ).toHaveLength(36);
+    expect(cageOverlay({ ...INITIAL, state: state(), mode: "set" }, null, [], eye).dots).toHaveLength(18);
   });
 
   it("has the other edits in their colours, hidden ones not, and nothing where cages are off or a page plays", () => {
     const edits = [edit(), edit({ id: 2, colour: "#ff0000" }), edit({ id: 3, enabled: false })];
-    const { segments } = cageOverlay({ ...START, state: state({ edits }) }, null, [], eye);
+    const { segments } = cageOverlay({ ...INITIAL, state: state({ edits }) }, null, [], eye);
     expect(segments).toHaveLength(48);
     expect(segments.filter(({ colour }) => colour.r > 0.99 && colour.g < 0.01)).toHaveLength(24);
     expect(
-      cageOverlay({ ...START, state: state({ edits }), cages: false }, null, [], eye).segments,
+      cageOverlay({ ...INITIAL, state: state({ edits }), cages: false }, null, [], eye).segments,
     ).toHaveLength(0);
     const preview: Preview = { type: "preview", page: 1, play: 1, on: true };
-    expect(cageOverlay({ ...START, state: state({ edits }), preview }, null, [], eye).segments).toHaveLength(
-      0,
-    );
+    expect(
+      cageOverlay({ ...INITIAL, state: state({ edits }), preview }, null, [], eye).segments,
+    ).toHaveLength(0);
   });
 
   it("has no handles where the edit is locked", () => {
     expect(
-      cageOverlay({ ...START, state: state({ edits: [edit({ locked: true })] }) }, null, [], eye).dots,
+      cageOverlay({ ...INITIAL, state: state({ edits: [edit({ locked: true })] }) }, null, [], eye).dots,
     ).toHaveLength(0);
   });
 });
@@ -218,7 +220,7 @@ describe("keys", () => {
     ]) {
       expect(all).toContain(key);
     }
-    for (const { keys } of HELD) for (const key of keys) expect(all).not.toContain(key);
+    for (const { keys } of MOUSE_BINDINGS) for (const key of keys) expect(all).not.toContain(key);
   });
 
   it("switch what is filled, and whether shadows go along, where there is such a thing", () => {
@@ -263,7 +265,7 @@ describe("keys", () => {
 
   it("are named as they are shown", () => {
     const key = (name: string, control = false, shift = false): string =>
-      named({ key: name, ctrlKey: control, metaKey: false, shiftKey: shift });
+      keyName({ key: name, ctrlKey: control, metaKey: false, shiftKey: shift });
     expect(key("z", true)).toBe("Ctrl+Z");
     expect(key("Z", true, true)).toBe("Ctrl+Shift+Z");
     expect(key("?", false, true)).toBe("?");
@@ -275,9 +277,9 @@ describe("keys", () => {
 describe("latency", () => {
   it("goes from the mouse's move to the picture that shows it", () => {
     const latency = new Latency();
-    latency.moved(1, 1, 100);
-    latency.moved(1, 2, 110);
-    latency.framed(116);
+    latency.addMove(1, 1, 100);
+    latency.addMove(1, 2, 110);
+    latency.finishLines(116);
     const picture = {
       time: 180,
       drag: 1,
@@ -288,8 +290,8 @@ describe("latency", () => {
       fullWidth: 100,
       final: false,
     };
-    latency.shown(picture, 150, 160, 20, 2);
-    latency.shown({ ...picture, time: 999 }, 150, 160, 20, 2);
+    latency.addPresented(picture, 150, 160, 20, 2);
+    latency.addPresented({ ...picture, time: 999 }, 150, 160, 20, 2);
     expect(latency.moves[0]).toMatchObject({ lines: 116, presented: null });
     expect(latency.moves[1]).toMatchObject({
       lines: 116,
@@ -303,7 +305,7 @@ describe("latency", () => {
   it("counts pictures a second", () => {
     const latency = new Latency();
     for (let time = 0; time <= 1000; time += 100) {
-      latency.shown(
+      latency.addPresented(
         { time, drag: 0, seq: 0, camera: 1, revision: 1, width: 1, fullWidth: 1, final: false },
         0,
         0,
@@ -311,7 +313,7 @@ describe("latency", () => {
         0,
       );
     }
-    expect(latency.perSecond(1000)).toBeCloseTo(10, 6);
-    expect(latency.perSecond(5000)).toBe(0);
+    expect(latency.frameRate(1000)).toBeCloseTo(10, 6);
+    expect(latency.frameRate(5000)).toBe(0);
   });
 });

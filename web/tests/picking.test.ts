@@ -1,6 +1,12 @@
 import { describe, expect, it } from "vitest";
 import { EDGES, FACE_NAMES } from "../src/editing/cage";
-import { distanceToEdges, facesTowards, pick, pickCorner, type Project } from "../src/editing/picking";
+import {
+  distanceToEdges,
+  visibleFaceCenters,
+  pickPart,
+  pickCorner,
+  type Project,
+} from "../src/editing/picking";
 import { box } from "./cages";
 
 /** Looks along -z from z = 10 without perspective: 100 pixels a unit, the origin at (500, 500). */
@@ -9,24 +15,24 @@ const cage = { corners: box([0, 0, 0], [2, 2, 2]), eye: [0, 0, 10] as [number, n
 
 describe("picking", () => {
   it("takes the nearer of two corners that are in line", () => {
-    expect(pick(600, 400, cage, project)).toEqual({ kind: "corner", index: 7 });
+    expect(pickPart(600, 400, cage, project)).toEqual({ kind: "corner", index: 7 });
     expect(pickCorner(601, 402, cage.corners, project)).toEqual({ kind: "corner", index: 7 });
   });
 
   it("takes the face that looks towards the eye by the square at its middle", () => {
-    expect(pick(503, 500, cage, project)).toEqual({ kind: "face", index: FACE_NAMES.indexOf("+z") });
-    expect(facesTowards(cage.corners, cage.eye).filter((at) => at !== null)).toHaveLength(1);
+    expect(pickPart(503, 500, cage, project)).toEqual({ kind: "face", index: FACE_NAMES.indexOf("+z") });
+    expect(visibleFaceCenters(cage.corners, cage.eye).filter((at) => at !== null)).toHaveLength(1);
   });
 
   it("takes the nearer edge", () => {
-    const found = pick(600, 470, cage, project);
+    const found = pickPart(600, 470, cage, project);
     expect(found?.kind).toBe("edge");
     expect(EDGES[found!.index]).toEqual([5, 7]);
   });
 
   it("takes nothing next to a cage, nor behind the camera", () => {
-    expect(pick(700, 700, cage, project)).toBeNull();
-    expect(pick(600, 400, { ...cage, corners: box([0, 0, 20], [2, 2, 2]) }, project)).toBeNull();
+    expect(pickPart(700, 700, cage, project)).toBeNull();
+    expect(pickPart(600, 400, { ...cage, corners: box([0, 0, 20], [2, 2, 2]) }, project)).toBeNull();
   });
 
   it("measures how far the edges are", () => {

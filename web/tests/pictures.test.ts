@@ -45,7 +45,7 @@ describe("a binary message", () => {
 describe("the distances of a picture", () => {
   it("are steps times the scale, and nothing where there is nothing", () => {
     const image = new DepthImage();
-    image.put(HEADER, new Uint16Array([1, 2, 3, 4, 5, 6, 7, 65535]));
+    image.addPart(HEADER, new Uint16Array([1, 2, 3, 4, 5, 6, 7, 65535]));
     expect(image.at(0.1, 0.1)).toBeCloseTo(0.5, 6);
     expect(image.at(0.6, 0.9)).toBeCloseTo(3.5, 6);
     expect(image.at(0.9, 0.9)).toBeNull();
@@ -53,7 +53,7 @@ describe("the distances of a picture", () => {
 
   it("keep what was there where only a finer tile came", () => {
     const image = new DepthImage();
-    image.put(HEADER, new Uint16Array([2, 2, 2, 2, 2, 2, 2, 2]));
+    image.addPart(HEADER, new Uint16Array([2, 2, 2, 2, 2, 2, 2, 2]));
     const tile = {
       ...HEADER,
       x: 4,
@@ -65,7 +65,7 @@ describe("the distances of a picture", () => {
       depth_width: 4,
       depth_height: 2,
     };
-    image.put(tile, new Uint16Array(8).fill(20));
+    image.addPart(tile, new Uint16Array(8).fill(20));
     expect([image.width, image.height]).toEqual([8, 4]);
     expect(image.at(0.9, 0.9)).toBeCloseTo(10, 6);
     expect(image.at(0.1, 0.9)).toBeCloseTo(1, 6);
@@ -84,7 +84,7 @@ describe("the distances of a picture", () => {
       depth_width: 2,
       depth_height: 2,
     };
-    image.put(part, new Uint16Array([2, 4, 6, 8]));
+    image.addPart(part, new Uint16Array([2, 4, 6, 8]));
     expect([image.width, image.height]).toEqual([4, 2]);
     expect(image.at(0.99, 0.99)).toBeCloseTo(4, 6);
     expect(image.at(0.2, 0.5)).toBeNull();

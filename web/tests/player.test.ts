@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { Matrix4, Quaternion, Vector3 } from "three";
-import { duration, stillAt } from "../src/app/camera_path";
+import { pathDuration, stillAt } from "../src/app/camera_path";
 import { Player, type Playable } from "../src/app/player";
 import { Store } from "../src/app/store";
 import type { Answer, Hello, Key, PageMessage, Still } from "../src/net/protocol";
@@ -19,9 +19,9 @@ const KEYS: Key[] = [STILLS[0], STILLS[2]].map((key) => ({ ...key, seconds: 2, p
 
 describe("the camera path", () => {
   it("takes each key's time to the next one, back to the first one in a loop", () => {
-    expect(duration(KEYS, false)).toBe(2);
-    expect(duration(KEYS, true)).toBe(4);
-    expect(duration(KEYS.slice(1), true)).toBe(0);
+    expect(pathDuration(KEYS, false)).toBe(2);
+    expect(pathDuration(KEYS, true)).toBe(4);
+    expect(pathDuration(KEYS.slice(1), true)).toBe(0);
   });
 
   it("goes through the server's stills, which are evenly spread over its time", () => {
@@ -54,10 +54,10 @@ class FakePage implements Playable {
   answer: Partial<Answer> | null = { stills: STILLS };
   readonly viewport = {
     beforeFrame: [] as (() => void)[],
-    taken: [] as (() => void)[],
+    userTurns: [] as (() => void)[],
     invalidate: (): void => undefined,
     pose: (c2w: readonly number[]): void => void this.poses.push([...c2w]),
-    settle: (): void => {
+    resetOrbit: (): void => {
       this.settled += 1;
     },
   };
@@ -135,7 +135,7 @@ describe("the player", () => {
 
   it("stops when the user takes the view, and when the server is gone", async () => {
     for (const leave of [
-      (page: FakePage) => page.viewport.taken[0](),
+      (page: FakePage) => page.viewport.userTurns[0](),
       (page: FakePage) => page.store.set({ connection: "lost" }),
     ]) {
       const page = new FakePage();

@@ -1,7 +1,7 @@
 import { Ray, Vector3 } from "three";
 import { describe, expect, it, vi } from "vitest";
 import type { App } from "../src/app/app";
-import { Store, selected, target } from "../src/app/store";
+import { Store, selectedEdit, dragTarget } from "../src/app/store";
 import type { Target } from "../src/app/store";
 import { Drag } from "../src/editing/drag";
 import type { Operation } from "../src/editing/operations";
@@ -38,7 +38,7 @@ class FakeEditor {
   readonly gizmo = {
     axis: null as string | null,
     hover: vi.fn(() => this.gizmo.axis),
-    leave: vi.fn(),
+    clearHover: vi.fn(),
     begin: vi.fn(),
     move: vi.fn((): Operation => ({ kind: "translate", by: [1, 0, 0] })),
     end: vi.fn(),
@@ -80,8 +80,8 @@ class FakeEditor {
     return true;
   }
 
-  beginDrag(dragged: Target = target(this.store.now)): Drag | null {
-    this.drag = new Drag(1, selected(this.store.now)!, dragged, (message) => this.send(message));
+  beginDrag(dragged: Target = dragTarget(this.store.now)): Drag | null {
+    this.drag = new Drag(1, selectedEdit(this.store.now)!, dragged, (message) => this.send(message));
     return this.drag;
   }
 

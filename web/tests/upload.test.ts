@@ -1,7 +1,7 @@
 import { afterEach, describe, expect, it, vi } from "vitest";
 import { Actions } from "../src/editing/actions";
 import { Store } from "../src/app/store";
-import { isSplats, openAddress, send, type Request } from "../src/net/upload";
+import { isSplatFile, uploadAddress, uploadFile, type Request } from "../src/net/upload";
 import type { App } from "../src/app/app";
 import { state } from "./fake_server";
 
@@ -24,21 +24,23 @@ function fakeRequest(): Request & { sent: unknown[]; address: string } {
 describe("files of splats", () => {
   it("are known by their names", () => {
     expect(
-      ["a.PLY", "b.compressed.ply", "c.spz", "d.sog", "e.splat", "f.ksplat", "g.glb"].every(isSplats),
+      ["a.PLY", "b.compressed.ply", "c.spz", "d.sog", "e.splat", "f.ksplat", "g.glb"].every(isSplatFile),
     ).toBe(true);
-    expect(["edits.yaml", "ply", "a.plyx", "camera_path.json"].some(isSplats)).toBe(false);
+    expect(["edits.yaml", "ply", "a.plyx", "camera_path.json"].some(isSplatFile)).toBe(false);
   });
 
   it("are sent to the page's own server, with its token", () => {
     const page = new URL("http://host:8000/?token=abc#x") as unknown as Location;
-    expect(openAddress(page, "my bike&co.ply")).toBe("http://host:8000/open?token=abc&name=my+bike%26co.ply");
+    expect(uploadAddress(page, "my bike&co.ply")).toBe(
+      "http://host:8000/open?token=abc&name=my+bike%26co.ply",
+    );
   });
 
   it("tell how far they are, and what the server says", async () => {
     const request = fakeRequest();
     const file = new File(["ply"], "a.ply");
     const shares: number[] = [];
-    const answer = send(request, file, "http://host/open?name=a.ply", (share) => shares.push(share));
+    const answer = uploadFile(request, file, "http://host/open?name=a.ply", (share) => shares.push(share));
     expect(request.address).toBe("POST http://host/open?name=a.ply");
     expect(request.sent).toEqual([file]);
     const progress = request.upload.onprogress as unknown as (event: {
@@ -55,7 +57,7 @@ describe("files of splats", () => {
 
   it("are refused in one line where the server is gone", async () => {
     const request = fakeRequest();
-    const answer = send(request, new File([], "a.ply"), "http://host/open", () => undefined);
+    const answer = uploadFile(request, new File([], "a.ply"), "http://host/open", () => undefined);
     (request.onerror as unknown as () => void)();
     expect(await answer).toMatch(/a\.ply could not be sent/);
   });

@@ -1,8 +1,8 @@
 /** The editor: its parts, connected to each other, to the server's messages and to the canvas. */
 import { Vector3 } from "three";
-import { middle } from "../editing/cage";
+import { centroid } from "../editing/cage";
 import { cageOverlay, shownCages } from "../editing/cage_overlay";
-import { Drag, leading } from "../editing/drag";
+import { Drag, targetCage } from "../editing/drag";
 import { Gizmo } from "../editing/gizmo";
 import { Grid } from "../editing/grid";
 import { Handles } from "../editing/handles";
@@ -31,7 +31,15 @@ import type {
 import { createDrawer } from "../splats/drawer_selection";
 import { Player } from "./player";
 import { recallCamera, recallTools } from "./session_storage";
-import { LOOKING, Store, maySay, obstacle, selected, showsCages, target } from "./store";
+import {
+  READ_ONLY_NOTICE,
+  Store,
+  maySend,
+  dragObstacle,
+  selectedEdit,
+  showsCages,
+  dragTarget,
+} from "./store";
 
 /** Values of the store whose change redraws the canvas. */
 const CANVAS_KEYS = [
@@ -126,8 +134,8 @@ export class App {
 
   /** Sends a message; false without a connection, or if the page may not send it. */
   send(message: PageMessage): boolean {
-    if (!maySay(this.store.now, message)) {
-      this.say(LOOKING, "warning");
+    if (!maySend(this.store.now, message)) {
+      this.say(READ_ONLY_NOTICE, "warning");
       return false;
     }
     return this.connection.send(message);
@@ -147,10 +155,10 @@ export class App {
   }
 
   /** Begins a drag of the selected edit; null if the edit cannot be dragged, and a notice says why. */
-  beginDrag(dragged = target(this.store.now)): Drag | null {
-    const edit = selected(this.store.now);
+  beginDrag(dragged = dragTarget(this.store.now)): Drag | null {
+    const edit = selectedEdit(this.store.now);
     if (edit === null || this.store.now.connection !== "open") return null;
-    const why = obstacle(this.store.now, edit);
+    const why = dragObstacle(this.store.now, edit);
     if (why !== null) {
       this.say(why, "warning");
       return null;
@@ -165,7 +173,7 @@ export class App {
   moveDrag(operation: Operation, time: number): void {
     if (this.drag === null) return;
     this.drag.move(operation);
-    this.frames.latency.moved(this.drag.id, this.drag.seq, time);
+    this.frames.latency.addMove(this.drag.id, this.drag.seq, time);
     this.store.set({ limit: this.drag.why });
     this.viewport.invalidate();
   }
@@ -190,27 +198,29 @@ export class App {
   /** Position of the gizmo between the chosen corners; null without chosen corners, where the pivot is the position. */
   get gizmoPosition(): Vector3 | null {
     const { now } = this.store;
-    const edit = selected(now);
+    const edit = selectedEdit(now);
     if (edit === null || now.corners.length === 0) return null;
-    return new Vector3(...middle(leading(shownCages(edit, this.drag), target(now)).corners, now.corners));
+    return new Vector3(
+      ...centroid(targetCage(shownCages(edit, this.drag), dragTarget(now)).corners, now.corners),
+    );
   }
 
   /** Updates lines, handles and the gizmo. */
   arrange(): void {
     const { now } = this.store;
-    const edit = selected(now);
+    const edit = selectedEdit(now);
     const eye = this.viewport.camera.position.toArray();
     const grid = now.grid && edit !== null ? this.grid.linesFor(edit, shownCages(edit, this.drag)) : [];
     const { segments, dots } = cageOverlay(now, this.drag, grid, eye);
     this.lines.set(segments);
     this.handles.set(dots);
     const hasGizmo = now.tool !== "select" || now.corners.length > 0;
-    if (edit === null || !showsCages(now) || obstacle(now, edit) !== null || !hasGizmo) {
+    if (edit === null || !showsCages(now) || dragObstacle(now, edit) !== null || !hasGizmo) {
       this.gizmo.hide();
       return;
     }
-    const cage = leading(shownCages(edit, this.drag), target(now));
-    if (this.gizmo.dragging) this.gizmo.settle(this.gizmoPosition ?? new Vector3(...cage.pivot));
+    const cage = targetCage(shownCages(edit, this.drag), dragTarget(now));
+    if (this.gizmo.dragging) this.gizmo.moveTo(this.gizmoPosition ?? new Vector3(...cage.pivot));
     else this.gizmo.show(now.tool, now.axes, cage, this.gizmoPosition);
   }
 
@@ -228,7 +238,7 @@ export class App {
         this.takeState(message);
         break;
       case "dragged":
-        if (this.drag?.answered(message)) this.viewport.invalidate();
+        if (this.drag?.takeAnswer(message)) this.viewport.invalidate();
         if (this.drag && !this.drag.ended) this.store.set({ limit: this.drag.why });
         break;
       case "answer":

@@ -1,14 +1,14 @@
-/** The camera path as the page plays it: the server's stills, and what lies between two of them. */
+/** Camera path in the editor: the server's closely spaced cameras, interpolated between neighbors. */
 import { MathUtils, Matrix4, Quaternion, Vector3 } from "three";
 import type { Key, Still } from "../net/protocol";
 
-/** How long the path takes, seconds: each key's time to the next one; the last counts where the path is a loop. */
-export function duration(keys: readonly Key[], loop: boolean): number {
+/** Duration of the path in seconds: the sum of the keys' times to the next key; the last key counts in a loop only. */
+export function pathDuration(keys: readonly Key[], loop: boolean): number {
   const legs = loop ? keys : keys.slice(0, -1);
   return keys.length < 2 ? 0 : legs.reduce((sum, key) => sum + key.seconds, 0);
 }
 
-/** The camera at a share of the path's time: evenly from one of the stills beside it to the other. */
+/** The camera at a share of the path's duration: position and field of view linear, rotation spherical linear. */
 export function stillAt(stills: readonly Still[], share: number): Still {
   const at = MathUtils.clamp(share, 0, 1) * (stills.length - 1);
   const before = Math.min(Math.floor(at), stills.length - 2);

@@ -4,8 +4,8 @@ import { App } from "./app";
 import { testApi } from "./test_api";
 import { bindings, listenForKeys } from "../editing/keys";
 import { Pointer } from "../editing/pointer";
-import { remember } from "./session_storage";
-import { LOOKING, looking } from "./store";
+import { storeSession } from "./session_storage";
+import { READ_ONLY_NOTICE, isReadOnly } from "./store";
 import { dialogs } from "../ui/dialogs";
 import { h } from "../ui/dom";
 import { editsList } from "../ui/edits_list";
@@ -30,7 +30,7 @@ const pointer = new Pointer(app);
 const keys = bindings(app, actions, pointer, questions);
 listenForKeys(app, actions, pointer, keys);
 
-// Who may look but not change anything finds its buttons and fields disabled.
+// Buttons and fields of a read-only page are disabled.
 const controls = h(
   "fieldset",
   { class: "controls" },
@@ -51,16 +51,16 @@ root.append(
   questions.element,
 );
 app.store.watch(["hello"], (now) => {
-  controls.disabled = looking(now);
-  root.classList.toggle("looking", looking(now));
+  controls.disabled = isReadOnly(now);
+  root.classList.toggle("looking", isReadOnly(now));
 });
 app.store.watch(["panel"], (now) => root.classList.toggle("wide", !now.panel));
 app.store.watch(["state", "hello"], ({ hello, state }) => {
   document.title = `${state?.saved === false ? "● " : ""}${hello?.name ?? "cagefield"}`;
 });
 addEventListener("beforeunload", (event) => {
-  if (app.store.now.hello !== null) remember(app.store.now, app.viewport.c2w);
-  if (app.store.now.state?.saved === false && !looking(app.store.now)) event.preventDefault();
+  if (app.store.now.hello !== null) storeSession(app.store.now, app.viewport.c2w);
+  if (app.store.now.state?.saved === false && !isReadOnly(app.store.now)) event.preventDefault();
 });
 addEventListener("dragover", (event) => {
   if (event.dataTransfer?.types.includes("Files")) event.preventDefault();
@@ -69,7 +69,7 @@ addEventListener("drop", (event) => {
   const file = event.dataTransfer?.files[0];
   if (file === undefined) return;
   event.preventDefault();
-  if (looking(app.store.now)) app.say(LOOKING, "warning");
+  if (isReadOnly(app.store.now)) app.say(READ_ONLY_NOTICE, "warning");
   else void actions.load(file);
 });
 document.addEventListener("visibilitychange", () => {

@@ -1,5 +1,5 @@
 /** Playback of the camera path: the page's camera follows the path, and frames show the edits as the video does. */
-import { duration, stillAt } from "./camera_path";
+import { pathDuration, stillAt } from "./camera_path";
 import type { Ask, Answer, PageMessage, Preview, Still } from "../net/protocol";
 import type { Store } from "./store";
 
@@ -11,11 +11,11 @@ export interface Playable {
   readonly viewport: {
     beforeFrame: (() => void)[];
     /** Called when the user begins to turn the view. */
-    taken: (() => void)[];
+    userTurns: (() => void)[];
     invalidate(): void;
     pose(c2w: readonly number[], fov_y_deg: number): void;
     /** Lets the user orbit from the camera as it is. */
-    settle(): void;
+    resetOrbit(): void;
   };
 }
 
@@ -44,7 +44,7 @@ export class Player {
   ) {
     // The first action of a frame: the camera is sent and drawn in the pose that is set here.
     app.viewport.beforeFrame.unshift(() => this.frame());
-    app.viewport.taken.push(() => this.stop());
+    app.viewport.userTurns.push(() => this.stop());
     app.store.watch(["connection"], ({ connection }) => {
       if (connection === "lost") this.stop();
     });
@@ -65,7 +65,7 @@ export class Player {
     this.run = this.expected = null;
     if (run !== null) {
       this.app.send({ type: "play_end", play: run.play });
-      this.app.viewport.settle();
+      this.app.viewport.resetOrbit();
     }
     this.changed(false);
   }
@@ -88,7 +88,7 @@ export class Player {
     }
     this.expected = null;
     const { keys, loop } = state;
-    this.run = { play, stills: answer.stills, duration: duration(keys, loop), loop, started: null };
+    this.run = { play, stills: answer.stills, duration: pathDuration(keys, loop), loop, started: null };
     this.app.viewport.invalidate();
   }
 

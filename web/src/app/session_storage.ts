@@ -1,22 +1,25 @@
-/** What a tab keeps of itself when its page is loaded again: its tools, and where it looks from. */
+/** State of a tab that survives a reload: the tools, and the camera. */
 import type { Editor } from "./store";
 
 const TOOLS = "cagefield.tools";
 const CAMERA = "cagefield.camera";
-const KEPT = ["mode", "tool", "axes", "cage", "view", "grid", "panel"] as const;
+const TOOL_KEYS = ["mode", "tool", "axes", "cage", "view", "grid", "panel"] as const;
 
-/** The tools as they were; nothing at the first visit. */
+/** The stored tools; empty at the first visit. */
 export function recallTools(): Partial<Editor> {
   return read(TOOLS) ?? {};
 }
 
-/** The camera-to-world pose as it was, row by row; null at the first visit. */
+/** The stored camera-to-world matrix, row by row; null at the first visit. */
 export function recallCamera(): number[] | null {
   return read(CAMERA) as number[] | null;
 }
 
-export function remember(editor: Editor, camera: number[]): void {
-  sessionStorage.setItem(TOOLS, JSON.stringify(Object.fromEntries(KEPT.map((key) => [key, editor[key]]))));
+export function storeSession(editor: Editor, camera: number[]): void {
+  sessionStorage.setItem(
+    TOOLS,
+    JSON.stringify(Object.fromEntries(TOOL_KEYS.map((key) => [key, editor[key]]))),
+  );
   sessionStorage.setItem(CAMERA, JSON.stringify(camera));
 }
 

@@ -1,5 +1,5 @@
-/** What the page knows and shows; views listen, one change at a time. */
-import type { Part } from "../editing/cage";
+/** State of the editor's page, with listeners that are called at each change. */
+import type { CagePart } from "../editing/cage";
 import type { Axes } from "../editing/operations";
 import type {
   Drawing,
@@ -16,13 +16,13 @@ import type {
 
 export type Tool = "select" | "translate" | "rotate" | "scale";
 export type View = NonNullable<DisplayMessage["view"]>;
-/** Which pictures the page draws itself. */
+/** Frames that the page draws itself. */
 export type DrawnHere = Drawing["here"];
 export type CageName = "inner" | "outer" | "both";
 export type Target = "field" | CageName;
 
 export interface Hover {
-  part: Part;
+  part: CagePart;
   cage: "inner" | "outer";
 }
 
@@ -33,7 +33,7 @@ export interface Figures {
   width: number;
   height: number;
   final: boolean;
-  /** Whether the page's own GPU drew it. */
+  /** Whether the page's own GPU drew the frame. */
   page: boolean;
 }
 
@@ -44,9 +44,9 @@ export interface Editor {
   mode: "set" | "edit";
   tool: Tool;
   axes: Axes;
-  /** Which cage Set mode moves. */
+  /** The cage that Set mode moves. */
   cage: CageName;
-  /** Snapping, while its key is held or its button is on. */
+  /** Whether the button for snapping is on; the key reverses the button. */
   snap: boolean;
   view: View;
   before: boolean;
@@ -55,25 +55,25 @@ export interface Editor {
   cages: boolean;
   panel: boolean;
   help: boolean;
-  /** Corners that are dragged together, by the gizmo or by any of them. */
+  /** Corners that are dragged together, by the gizmo or by one of the corners. */
   corners: number[];
   hover: Hover | null;
-  /** Why the drag that goes on stopped, or null. */
+  /** Reason for the limit of the drag in progress; null without a limit. */
   limit: string | null;
   notice: Notice | null;
-  /** How much of the renderer is ready, or null before it was said. */
+  /** Progress of the renderer's preparation; null before the server reports it. */
   preparing: Preparing | null;
   jobs: Job[];
-  /** A file that this page opens, and the share of it that has been sent. */
+  /** A file that this page is uploading, and the share that has been sent. */
   upload: { name: string; share: number } | null;
-  /** What a page plays of the camera path, and pictures show, or null. */
+  /** The preview of the camera path that frames show, of this or another page; null without a preview. */
   preview: Preview | null;
-  /** The share of the field's file that has come, while it is loaded; else null. */
+  /** The share of the field's file that has arrived; null without a load in progress. */
   loading: number | null;
   figures: Figures;
 }
 
-export const START: Editor = {
+export const INITIAL: Editor = {
   connection: "connecting",
   hello: null,
   state: null,
@@ -108,14 +108,14 @@ export class Store {
   private readonly listeners: Listener[] = [];
 
   constructor(start: Partial<Editor> = {}) {
-    this.editor = { ...START, ...start };
+    this.editor = { ...INITIAL, ...start };
   }
 
   get now(): Editor {
     return this.editor;
   }
 
-  /** Takes changes over and tells the listeners, unless nothing is other than before. */
+  /** Applies changes and calls the listeners, unless all values are equal to the current ones. */
   set(change: Partial<Editor>): void {
     const before = this.editor;
     const keys = Object.keys(change) as (keyof Editor)[];
@@ -125,12 +125,12 @@ export class Store {
     for (const listener of this.listeners) listener(now, before);
   }
 
-  /** Calls a listener at every change. */
+  /** Adds a listener for all changes. */
   listen(listener: Listener): void {
     this.listeners.push(listener);
   }
 
-  /** Calls an action now, and whenever one of these values is another. */
+  /** Calls an action now and at each change of one of the values. */
   watch(keys: (keyof Editor)[], action: (now: Editor) => void): void {
     this.listen((now, before) => {
       if (keys.some((key) => now[key] !== before[key])) action(now);
@@ -139,43 +139,43 @@ export class Store {
   }
 }
 
-/** The selected edit, or null. */
-export function selected(editor: Editor): EditState | null {
+/** The selected edit; null without a selection. */
+export function selectedEdit(editor: Editor): EditState | null {
   const state = editor.state;
   return state?.edits.find((edit) => edit.id === state.selected) ?? null;
 }
 
-/** Whether cages are to be seen: a preview has none, as its video. */
+/** Whether cages are visible: a preview has none, like its video. */
 export function showsCages(editor: Editor): boolean {
   return editor.cages && editor.preview === null;
 }
 
-/** What a drag of the selected edit moves: the field in Edit mode, cages in Set mode. */
-export function target(editor: Editor): Target {
+/** Target of a drag of the selected edit: the field in Edit mode, cages in Set mode. */
+export function dragTarget(editor: Editor): Target {
   if (editor.mode === "edit") return "field";
-  return selected(editor)?.outer === null ? "inner" : editor.cage;
+  return selectedEdit(editor)?.outer === null ? "inner" : editor.cage;
 }
 
-/** What a page is told that came by a link which may not change anything. */
-export const LOOKING = "this link may look but not change anything";
+/** Notice of a page with a read-only link. */
+export const READ_ONLY_NOTICE = "this link may look but not change anything";
 
-/** What such a page may say: the server takes nothing else of it. */
-const OF_LOOKERS: PageMessage["type"][] = ["camera", "display", "presented", "drawing", "ask"];
+/** Messages that the server accepts from a read-only page. */
+const READ_ONLY_MESSAGES: PageMessage["type"][] = ["camera", "display", "presented", "drawing", "ask"];
 
-/** Whether the page may look but not change anything. */
-export function looking(editor: Editor): boolean {
+/** Whether the page has a read-only link. */
+export function isReadOnly(editor: Editor): boolean {
   return editor.hello?.read_only === true;
 }
 
-/** Whether the server takes a message of this page. */
-export function maySay(editor: Editor, message: PageMessage): boolean {
-  return !looking(editor) || OF_LOOKERS.includes(message.type);
+/** Whether the server accepts a message from this page. */
+export function maySend(editor: Editor, message: PageMessage): boolean {
+  return !isReadOnly(editor) || READ_ONLY_MESSAGES.includes(message.type);
 }
 
-/** Whether the edit can be dragged at all, or why not. */
-export function obstacle(editor: Editor, edit: EditState): string | null {
+/** Reason why the edit cannot be dragged; null if it can. */
+export function dragObstacle(editor: Editor, edit: EditState): string | null {
   const { mode } = editor;
-  if (looking(editor)) return LOOKING;
+  if (isReadOnly(editor)) return READ_ONLY_NOTICE;
   if (edit.locked) return `“${edit.name}” is locked`;
   if (!edit.enabled) return `“${edit.name}” is hidden; show it (H) to move it`;
   if (mode === "edit" && edit.kind === "delete")
@@ -183,22 +183,22 @@ export function obstacle(editor: Editor, edit: EditState): string | null {
   return null;
 }
 
-/** Whether there is a selected edit: all of them may take light along. */
-export function relightable(editor: Editor): boolean {
-  return selected(editor) !== null;
+/** Whether shadows can move with the selected edit: with every kind of edit. */
+export function canRelight(editor: Editor): boolean {
+  return selectedEdit(editor) !== null;
 }
 
-/** What the renderer still does before whole pictures come as they will, in words; null once they do. */
-export function awaited({ preparing, figures, state }: Editor): string | null {
+/** Text for the work of the renderer before the first complete frames; null once it is done. */
+export function preparationText({ preparing, figures, state }: Editor): string | null {
   if (preparing === null || preparing.done >= preparing.of) return null;
   const patched =
     state?.edits.some((edit) => edit.enabled && (edit.fill !== "none" || edit.relight !== "none")) ?? false;
-  if (patched && figures.width > 0 && !figures.final) return "Working out what is filled, and the light";
+  if (patched && figures.width > 0 && !figures.final) return "Computing fill and light";
   return `Preparing the renderer ${preparing.done + 1}/${preparing.of} – a machine's first run only`;
 }
 
-/** Whether the selected edit uncovers something that can be filled; a copy leaves its source where it is. */
-export function fillable(editor: Editor): boolean {
-  const edit = selected(editor);
+/** Whether the selected edit uncovers an area that can be filled; a copy keeps its source in place. */
+export function canFill(editor: Editor): boolean {
+  const edit = selectedEdit(editor);
   return edit !== null && edit.kind !== "continuous" && edit.kind !== "copy";
 }

@@ -1,12 +1,12 @@
 /** `window.cagefield`: state of the page for tests and measurements. */
-import { cornersOf, middle, type Part } from "../editing/cage";
+import { partCorners, centroid, type CagePart } from "../editing/cage";
 import type { App } from "./app";
 import type { Latency } from "../frames/latency";
 import type { Operation } from "../editing/operations";
 import type { PictureHeader } from "../net/protocol";
 import { pickCorner } from "../editing/picking";
-import { draggable } from "../editing/cage_overlay";
-import { selected, type DrawnHere, type Editor } from "./store";
+import { draggableCages } from "../editing/cage_overlay";
+import { selectedEdit, type DrawnHere, type Editor } from "./store";
 
 export interface TestApi {
   readonly now: Editor;
@@ -40,7 +40,7 @@ export interface TestApi {
   /** Position of a part of a drawn cage, in CSS pixels of the window. */
   screen(
     edit: number,
-    kind: Part["kind"],
+    kind: CagePart["kind"],
     index: number,
     cage?: "inner" | "deformed" | "outer",
   ): { x: number; y: number };
@@ -110,7 +110,7 @@ export function testApi(app: App): TestApi {
       const edit = app.store.now.state?.edits.find((each) => each.id === id);
       const posed = edit && app.shownCages(edit)[cage];
       if (!posed) throw new Error(`edit ${id} has no ${cage} cage`);
-      const { x, y } = viewport.project(middle(posed.corners, cornersOf({ kind, index })));
+      const { x, y } = viewport.project(centroid(posed.corners, partCorners({ kind, index })));
       return inWindow(x, y);
     },
     grip(axis) {
@@ -120,8 +120,8 @@ export function testApi(app: App): TestApi {
         (0.5 + 0.5 * at.x) * width,
         (0.5 - 0.5 * at.y) * height,
       ];
-      const edit = selected(app.store.now);
-      const cages = edit === null ? [] : draggable(app.store.now, app.shownCages(edit));
+      const edit = selectedEdit(app.store.now);
+      const cages = edit === null ? [] : draggableCages(app.store.now, app.shownCages(edit));
       const slack = { x: 4 / width, y: 4 / height };
       const at = app.gizmo.grip(axis, slack, (device) =>
         cages.every(({ corners }) => pickCorner(...pixel(device), corners, viewport.project) === null),

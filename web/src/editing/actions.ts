@@ -1,14 +1,14 @@
-/** What a user can do beside dragging: for keys, buttons and menus alike. */
-import { extent, middle } from "./cage";
-import { leading } from "./drag";
+/** Actions of the user apart from drags, for keys, buttons and menus. */
+import { halfExtent, centroid } from "./cage";
+import { targetCage } from "./drag";
 import type { App } from "../app/app";
 import type { Command, EditState, Mirror, Place, Vec3 } from "../net/protocol";
-import { isSplats, openAddress, send } from "../net/upload";
+import { isSplatFile, uploadAddress, uploadFile } from "../net/upload";
 import {
-  fillable,
-  relightable,
-  selected,
-  target,
+  canFill,
+  canRelight,
+  selectedEdit,
+  dragTarget,
   type CageName,
   type Editor,
   type Tool,
@@ -19,44 +19,44 @@ const VIEWS: View[] = ["colour", "depth", "opacity", "normals"];
 const CAGES: CageName[] = ["inner", "outer", "both"];
 
 export class Actions {
-  private camera = -1;
+  private cameraIndex = -1;
 
-  /** `whereTo` asks for the folder to save into. */
+  /** `askFolder` asks for the folder to save into. */
   constructor(
     private readonly app: App,
-    private readonly whereTo: () => void = () => undefined,
+    private readonly askFolder: () => void = () => undefined,
   ) {}
 
-  tool(tool: Tool): void {
+  setTool(tool: Tool): void {
     this.app.store.set({ tool });
   }
 
-  mode(mode: Editor["mode"]): void {
+  setMode(mode: Editor["mode"]): void {
     this.app.store.set({ mode, corners: [], hover: null });
   }
 
   toggleMode(): void {
-    this.mode(this.app.store.now.mode === "set" ? "edit" : "set");
+    this.setMode(this.app.store.now.mode === "set" ? "edit" : "set");
   }
 
   toggleAxes(): void {
     this.app.store.set({ axes: this.app.store.now.axes === "world" ? "cage" : "world" });
   }
 
-  cage(cage: CageName): void {
+  setCage(cage: CageName): void {
     this.app.store.set({ cage, corners: [], hover: null });
   }
 
   nextCage(): void {
-    this.cage(next(CAGES, this.app.store.now.cage));
+    this.setCage(next(CAGES, this.app.store.now.cage));
   }
 
-  view(view: View): void {
+  setView(view: View): void {
     this.app.store.set({ view });
   }
 
   nextView(): void {
-    this.view(next(VIEWS, this.app.store.now.view));
+    this.setView(next(VIEWS, this.app.store.now.view));
   }
 
   toggle(what: "snap" | "grid" | "cages" | "panel" | "help"): void {
@@ -71,9 +71,9 @@ export class Actions {
     this.app.send({ type: "command", name, edit });
   }
 
-  /** Does something to the selected edit, or says that none is selected. */
+  /** Calls an action with the selected edit, or says that none is selected. */
   withSelected(action: (edit: EditState) => void): void {
-    const edit = selected(this.app.store.now);
+    const edit = selectedEdit(this.app.store.now);
     if (edit === null) this.app.say("no edit is selected: double-click the picture to make one", "warning");
     else action(edit);
   }
@@ -82,7 +82,7 @@ export class Actions {
     this.withSelected((edit) => this.command("duplicate", edit.id));
   }
 
-  remove(): void {
+  removeSelected(): void {
     this.withSelected((edit) => this.command("remove", edit.id));
   }
 
@@ -90,24 +90,24 @@ export class Actions {
     this.withSelected((edit) => this.app.send({ type: "mirror", edit: edit.id, axis }));
   }
 
-  hide(): void {
+  toggleEnabled(): void {
     this.withSelected((edit) => this.app.send({ type: "change", edit: edit.id, enabled: !edit.enabled }));
   }
 
-  /** Continuous to move, and all discrete kinds back to continuous. */
+  /** Changes a continuous edit to a move, and any discrete edit to a continuous one. */
   toggleKind(): void {
     this.withSelected((edit) => {
       if (edit.source !== null)
-        return this.app.say("what is pasted stays a copy; remove it to take it away", "warning");
+        return this.app.say("a paste is always a copy; remove the edit to remove the paste", "warning");
       const kind = edit.kind === "continuous" ? "move" : "continuous";
       this.app.send({ type: "change", edit: edit.id, kind });
     });
   }
 
-  /** Fills what a move or a delete uncovers, or leaves it. */
+  /** Switches the fill of the area that a move or a delete uncovers. */
   toggleFill(): void {
     this.withSelected((edit) => {
-      if (!fillable(this.app.store.now))
+      if (!canFill(this.app.store.now))
         this.app.say("only a move or a delete uncovers something to fill", "warning");
       else
         this.app.send({
@@ -118,10 +118,10 @@ export class Actions {
     });
   }
 
-  /** Lets shadows go along with an edit, or stay. */
+  /** Switches whether shadows move with an edit. */
   toggleShadows(): void {
     this.withSelected((edit) => {
-      if (!relightable(this.app.store.now))
+      if (!canRelight(this.app.store.now))
         this.app.say("choose an edit first: its shadows go along, or stay", "warning");
       else
         this.app.send({
@@ -145,12 +145,12 @@ export class Actions {
     this.withSelected((edit) => this.app.send({ type: "outer_margin", edit: edit.id, margin }));
   }
 
-  /** Turns the view's orbit around the selected cage, or around the surface at a CSS pixel where none is. */
+  /** Centers the orbit on the selected cage; without a selection, on the surface at a CSS pixel. */
   focus(x: number, y: number): void {
-    const edit = selected(this.app.store.now);
+    const edit = selectedEdit(this.app.store.now);
     if (edit !== null) {
-      const { corners } = leading(this.app.shownCages(edit), target(this.app.store.now));
-      this.app.viewport.focus(middle(corners), 2 * extent(corners));
+      const { corners } = targetCage(this.app.shownCages(edit), dragTarget(this.app.store.now));
+      this.app.viewport.focus(centroid(corners), 2 * halfExtent(corners));
       return;
     }
     const { width, height } = this.app.viewport.points;
@@ -162,16 +162,16 @@ export class Actions {
     });
   }
 
-  /** Looks from where the scene is seen at first, or from one of its cameras. */
+  /** Looks from the scene's first view, or from the camera `step` places further in its list. */
   lookFrom(step: number | null): void {
     const { hello } = this.app.store.now;
     if (hello === null) return;
     const around = hello.bounds[0].map((low, i) => 0.5 * (low + hello.bounds[1][i])) as Vec3;
     let pose = hello.start.c2w;
     if (step !== null && hello.cameras.length > 0) {
-      this.camera = (this.camera + step + hello.cameras.length) % hello.cameras.length;
-      pose = hello.cameras[this.camera];
-      this.app.say(`camera ${this.camera + 1} of ${hello.cameras.length}`);
+      this.cameraIndex = (this.cameraIndex + step + hello.cameras.length) % hello.cameras.length;
+      pose = hello.cameras[this.cameraIndex];
+      this.app.say(`camera ${this.cameraIndex + 1} of ${hello.cameras.length}`);
     }
     this.app.viewport.lookFrom(pose, hello.start.fov_y_deg, hello.up, around);
   }
@@ -194,15 +194,15 @@ export class Actions {
     if (text.trim() !== "") this.app.send({ type: "load_edits", text, append: true });
   }
 
-  /** Opens a file of splats in the place of the scene; takes another file's edits. */
+  /** Opens a file of splats in place of the scene; loads the edits of any other file. */
   async load(file: File): Promise<void> {
-    if (isSplats(file.name)) await this.open(file);
+    if (isSplatFile(file.name)) await this.open(file);
     else this.app.send({ type: "load_edits", text: await file.text(), append: false });
   }
 
-  /** Saves; of a file that was opened, asks for a folder first. */
+  /** Saves the scene; asks for a folder first if the scene is an opened file. */
   save(): void {
-    if (this.app.store.now.state?.is_file) this.whereTo();
+    if (this.app.store.now.state?.is_file) this.askFolder();
     else this.command("save");
   }
 
@@ -214,7 +214,7 @@ export class Actions {
     const { name } = file;
     this.app.store.set({ upload: { name, share: 0 } });
     const progress = (share: number): void => this.app.store.set({ upload: { name, share } });
-    const why = await send(new XMLHttpRequest(), file, openAddress(location, name), progress);
+    const why = await uploadFile(new XMLHttpRequest(), file, uploadAddress(location, name), progress);
     this.app.store.set({ upload: null });
     if (why !== null) this.app.say(why, "error");
   }
@@ -227,7 +227,7 @@ export class Actions {
     this.app.send({ type: "set_path", keys: [...state.keys, key], loop: state.loop });
   }
 
-  /** Gives up what goes on: the drag, the help, the choice of corners, the selection. */
+  /** Cancels the first of these that exists: the drag, the help, the chosen corners, the selection. */
   escape(cancelDrag: () => boolean): void {
     const { now } = this.app.store;
     if (cancelDrag()) return;

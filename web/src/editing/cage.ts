@@ -8,11 +8,11 @@ import type { Corners, Vec3 } from "../net/protocol";
 export type Edge = readonly [number, number];
 export type FaceName = "+x" | "-x" | "+y" | "-y" | "+z" | "-z";
 
-const ALL = [0, 1, 2, 3, 4, 5, 6, 7] as const;
+const ALL_CORNERS = [0, 1, 2, 3, 4, 5, 6, 7] as const;
 
 /** The 12 edges (i, j), i < j: four along x, four along y, four along z. */
 export const EDGES: readonly Edge[] = [0, 1, 2].flatMap((axis) =>
-  ALL.filter((k) => !((k >> axis) & 1)).map((k): Edge => [k, k | (1 << axis)]),
+  ALL_CORNERS.filter((k) => !((k >> axis) & 1)).map((k): Edge => [k, k | (1 << axis)]),
 );
 
 export const FACE_NAMES: readonly FaceName[] = ["+x", "-x", "+y", "-y", "+z", "-z"];
@@ -21,43 +21,43 @@ export const FACE_NAMES: readonly FaceName[] = ["+x", "-x", "+y", "-y", "+z", "-
 export const FACES: readonly (readonly number[])[] = FACE_NAMES.map((name) => {
   const axis = "xyz".indexOf(name[1]);
   const bit = name[0] === "+" ? 1 : 0;
-  return ALL.filter((k) => ((k >> axis) & 1) === bit);
+  return ALL_CORNERS.filter((k) => ((k >> axis) & 1) === bit);
 });
 
-/** A corner, an edge or a face: the parts of a cage that can be dragged. */
-export interface Part {
+/** A part of a cage that can be dragged: a corner, an edge or a face. */
+export interface CagePart {
   kind: "corner" | "edge" | "face";
   /** Corner number, or index in `EDGES` or `FACES`. */
   index: number;
 }
 
-/** The corners that belong to a part. */
-export function cornersOf(part: Part): number[] {
+/** Numbers of the corners of a part. */
+export function partCorners(part: CagePart): number[] {
   if (part.kind === "corner") return [part.index];
   return [...(part.kind === "edge" ? EDGES : FACES)[part.index]];
 }
 
-/** Mean of some of the corners, of all 8 unless told. */
-export function middle(corners: Corners, which: readonly number[] = ALL): Vec3 {
+/** Mean of the given corners [3]; of all 8 by default. */
+export function centroid(corners: Corners, which: readonly number[] = ALL_CORNERS): Vec3 {
   const sum = new Vector3();
   for (const k of which) sum.add(new Vector3(...corners[k]));
   return sum.divideScalar(which.length).toArray();
 }
 
-/** Unit edge directions at the cage's middle, as the columns of a matrix. */
-export function axesOf(corners: Corners): Matrix3 {
+/** Unit edge directions at the center of the cage, as the columns of a matrix. */
+export function edgeDirections(corners: Corners): Matrix3 {
   const columns = [0, 1, 2].map((axis) => {
     const sum = new Vector3();
-    for (const k of ALL) sum.addScaledVector(new Vector3(...corners[k]), (k >> axis) & 1 ? 1 : -1);
+    for (const k of ALL_CORNERS) sum.addScaledVector(new Vector3(...corners[k]), (k >> axis) & 1 ? 1 : -1);
     return sum.normalize();
   });
   const [x, y, z] = columns;
   return new Matrix3().set(x.x, y.x, z.x, x.y, y.y, z.y, x.z, y.z, z.z);
 }
 
-/** The rotation nearest to the cage's axes: the orthogonal factor of their polar decomposition. */
-export function orientation(corners: Corners): Quaternion {
-  let q = axesOf(corners);
+/** The rotation closest to the edge directions: the orthogonal factor of their polar decomposition. */
+export function nearestRotation(corners: Corners): Quaternion {
+  let q = edgeDirections(corners);
   for (let step = 0; step < 60; step++) {
     const next = q.clone().invert().transpose();
     let change = 0;
@@ -72,26 +72,28 @@ export function orientation(corners: Corners): Quaternion {
   return new Quaternion().setFromRotationMatrix(new Matrix4().setFromMatrix3(q));
 }
 
-/** Unit outward normal of a face at its middle. */
+/** Unit outward normal of a face at its center. */
 export function faceNormal(corners: Corners, face: number): Vec3 {
   const [a, b, c, d] = FACES[face].map((k) => new Vector3(...corners[k]));
   const along = b.clone().add(d).sub(a).sub(c);
   const across = c.clone().add(d).sub(a).sub(b);
-  const outward = new Vector3(...middle(corners, FACES[face])).sub(new Vector3(...middle(corners)));
+  const outward = new Vector3(...centroid(corners, FACES[face])).sub(new Vector3(...centroid(corners)));
   const normal = along.cross(across).normalize();
   return (normal.dot(outward) < 0 ? normal.negate() : normal).toArray();
 }
 
-/** Half the mean distance between opposite faces' middles: how large a cage is. */
-export function extent(corners: Corners): number {
+/** Half the mean distance between the centers of opposite faces, world units. */
+export function halfExtent(corners: Corners): number {
   const spans = [0, 2, 4].map((face) =>
-    new Vector3(...middle(corners, FACES[face])).distanceTo(new Vector3(...middle(corners, FACES[face + 1]))),
+    new Vector3(...centroid(corners, FACES[face])).distanceTo(
+      new Vector3(...centroid(corners, FACES[face + 1])),
+    ),
   );
   return (spans[0] + spans[1] + spans[2]) / 6;
 }
 
 /** Whether two cages have the same corners, to a millionth of their size. */
-export function same(a: Corners, b: Corners): boolean {
-  const slack = 1e-6 * extent(a);
+export function haveSameCorners(a: Corners, b: Corners): boolean {
+  const slack = 1e-6 * halfExtent(a);
   return a.every((corner, k) => corner.every((x, i) => Math.abs(x - b[k][i]) <= slack));
 }

@@ -1,46 +1,48 @@
 /**
- * A drag as the page sees it: cages that follow the mouse at once, messages to the server, and its answers,
- * which say how far the drag may go.
+ * A drag in the page: cages that follow the mouse at once, messages to the server, and the server's answers, which state
+ * the granted share of the operation.
  */
-import { apply, part, type Operation, type Posed } from "./operations";
-import { containedPart, expectedPart } from "./limits";
-import { extent, middle } from "./cage";
+import { apply, scaleOperation, type Operation, type Posed } from "./operations";
+import { containedShare, expectedShare } from "./limits";
+import { halfExtent, centroid } from "./cage";
 import type { Corners, Dragged, EditState, PageMessage } from "../net/protocol";
 import type { Target } from "../app/store";
 
-/** How far apart cages are that count as the same, as a share of their size. */
-const ROUNDING = 1e-5;
+/** Distance of corners below which cages count as equal, as a share of the cage's size. */
+const CAGE_TOLERANCE = 1e-5;
 
-/** What the server says, too, where a continuous edit is confined. */
-const AT_OUTER_CAGE = "the inner cage must stay inside the outer cage; enlarge the outer cage (Set mode)";
+/** Reason for the limit of a continuous edit; the server's words. */
+const OUTER_CAGE_LIMIT = "the inner cage must stay inside the outer cage; enlarge the outer cage (Set mode)";
 
-/** The cages of an edit, as they are shown. */
+/** The cages of an edit as they are drawn. */
 export interface Cages {
   inner: Posed;
   deformed: Posed;
   outer: Posed | null;
 }
 
-/** The cages of an edit at rest. */
+/** The cages of an edit without a drag. */
 export function cagesOf(edit: EditState): Cages {
   return {
     inner: { corners: edit.inner, pivot: edit.inner_pivot },
     deformed: { corners: edit.deformed, pivot: edit.pivot },
-    outer: edit.outer && { corners: edit.outer, pivot: edit.outer_pivot ?? middle(edit.outer) },
+    outer: edit.outer && { corners: edit.outer, pivot: edit.outer_pivot ?? centroid(edit.outer) },
   };
 }
 
-/** The cage that a gizmo of this target stands on. */
-export function leading(cages: Cages, target: Target): Posed {
+/** The cage that carries the gizmo for a target of a drag. */
+export function targetCage(cages: Cages, target: Target): Posed {
   if (target === "field") return cages.deformed;
   return target === "outer" && cages.outer ? cages.outer : cages.inner;
 }
 
-/** Whether cages are where others are, but for rounding. */
-function alike(a: Cages, b: Cages): boolean {
-  const size = extent(a.deformed.corners);
+/** Whether cages are equal up to CAGE_TOLERANCE. */
+function areSimilar(a: Cages, b: Cages): boolean {
+  const size = halfExtent(a.deformed.corners);
   const near = (p: Posed, q: Posed): boolean =>
-    p.corners.every((corner, k) => corner.every((x, i) => Math.abs(x - q.corners[k][i]) < ROUNDING * size));
+    p.corners.every((corner, k) =>
+      corner.every((x, i) => Math.abs(x - q.corners[k][i]) < CAGE_TOLERANCE * size),
+    );
   const outer = a.outer === null || b.outer === null ? a.outer === b.outer : near(a.outer, b.outer);
   return near(a.inner, b.inner) && near(a.deformed, b.deformed) && outer;
 }
@@ -49,13 +51,13 @@ export class Drag {
   readonly start: Cages;
   shown: Cages;
   operation: Operation | null = null;
-  /** As much of the operation as the cages follow. */
+  /** The share of the operation that the cages follow. */
   followed: Operation | null = null;
   seq = 0;
-  /** Why the drag stopped, or null while all of it is followed. */
+  /** Reason for the limit of the drag; null while the cages follow the whole operation. */
   why: string | null = null;
   ended = false;
-  private last: { operation: Operation; part: number; why: string | null } | null = null;
+  private lastAnswer: { operation: Operation; part: number; why: string | null } | null = null;
   private readonly sent = new Map<number, Operation>();
 
   constructor(
@@ -69,40 +71,43 @@ export class Drag {
     send({ type: "drag_begin", drag: id, edit: edit.id, target });
   }
 
-  /** Moves the cages to where the whole operation since the beginning takes them, as far as it may go. */
+  /** Applies the whole operation since the start of the drag, as far as the estimated limit allows. */
   move(operation: Operation): void {
     if (this.ended) return;
     this.operation = operation;
     this.seq += 1;
     this.sent.set(this.seq, operation);
     this.send({ type: "drag", drag: this.id, seq: this.seq, operation });
-    const byCage = this.confined ? containedPart(operation, this.start.deformed, this.outerCorners) : 1;
-    const byServer = expectedPart(operation, this.last);
+    const byCage = this.isConfined ? containedShare(operation, this.start.deformed, this.outerCorners) : 1;
+    const byServer = expectedShare(operation, this.lastAnswer);
     const share = Math.min(byCage, byServer);
-    this.why = share >= 1 ? null : (this.last?.why ?? AT_OUTER_CAGE);
-    this.follow(operation, share);
+    this.why = share >= 1 ? null : (this.lastAnswer?.why ?? OUTER_CAGE_LIMIT);
+    this.applyShare(operation, share);
   }
 
-  /** Takes the server's answer over; true where the cages are elsewhere than they were shown. */
-  answered(message: Dragged): boolean {
+  /** Applies the server's answer; returns whether the drawn cages change. */
+  takeAnswer(message: Dragged): boolean {
     const operation = this.sent.get(message.seq);
     if (message.drag !== this.id || operation === undefined) return false;
     for (const seq of this.sent.keys()) if (seq < message.seq) this.sent.delete(seq);
-    this.last = { operation, part: message.part, why: message.why };
+    this.lastAnswer = { operation, part: message.part, why: message.why };
     if (message.seq !== this.seq) return false;
     this.why = message.why;
     const before = this.shown;
-    this.follow(operation, message.part);
+    this.applyShare(operation, message.part);
     const pivots = this.shown;
     this.shown = {
       inner: { corners: message.inner, pivot: pivots.inner.pivot },
       deformed: { corners: message.deformed, pivot: pivots.deformed.pivot },
-      outer: message.outer && { corners: message.outer, pivot: pivots.outer?.pivot ?? middle(message.outer) },
+      outer: message.outer && {
+        corners: message.outer,
+        pivot: pivots.outer?.pivot ?? centroid(message.outer),
+      },
     };
-    return !alike(before, this.shown);
+    return !areSimilar(before, this.shown);
   }
 
-  /** Ends the drag: what was dragged becomes an entry of the history. A drag that moved nothing is none. */
+  /** Ends the drag, which becomes an entry of the history; a drag without a motion is cancelled. */
   end(): void {
     if (this.ended) return;
     this.ended = true;
@@ -110,7 +115,7 @@ export class Drag {
     else this.send({ type: "drag_end", drag: this.id, seq: this.seq, operation: this.operation });
   }
 
-  /** Gives the drag up: everything as before it. */
+  /** Cancels the drag and restores the cages. */
   cancel(): void {
     if (this.ended) return;
     this.ended = true;
@@ -118,12 +123,12 @@ export class Drag {
     this.send({ type: "drag_cancel", drag: this.id });
   }
 
-  private follow(operation: Operation, share: number): void {
-    this.followed = share < 1 ? part(operation, share) : operation;
-    this.shown = this.after(this.followed);
+  private applyShare(operation: Operation, share: number): void {
+    this.followed = share < 1 ? scaleOperation(operation, share) : operation;
+    this.shown = this.cagesAfter(this.followed);
   }
 
-  private get confined(): boolean {
+  private get isConfined(): boolean {
     return this.target === "field" && this.edit.kind === "continuous";
   }
 
@@ -131,7 +136,7 @@ export class Drag {
     return this.start.outer?.corners ?? null;
   }
 
-  private after(operation: Operation): Cages {
+  private cagesAfter(operation: Operation): Cages {
     const { inner, deformed, outer } = this.start;
     switch (this.target) {
       case "field": {
@@ -150,7 +155,7 @@ export class Drag {
     }
   }
 
-  /** The inner cage after a drag in Set mode; the deformed one with it, as long as nothing tells them apart. */
+  /** The inner cage after a drag in Set mode; an edit without operations has an equal deformed cage. */
   private innerAfter(operation: Operation): { inner: Posed; deformed: Posed } {
     const inner = apply(operation, this.start.inner);
     return {

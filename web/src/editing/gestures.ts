@@ -1,55 +1,57 @@
-/** Operations from what the mouse does: with the gizmo, or by a corner, an edge or a face. */
+/** Operations from motions of the gizmo, or of a corner, an edge or a face. */
 import { Quaternion, Ray, Vector3 } from "three";
-import { degrees, tidy, type Axes, type Operation } from "./operations";
+import { degreesFromQuaternion, roundDecimals, type Axes, type Operation } from "./operations";
 import type { Vec3 } from "../net/protocol";
 
-const UNIT: Record<string, Vector3> = {
+const UNIT_VECTORS: Record<string, Vector3> = {
   X: new Vector3(1, 0, 0),
   Y: new Vector3(0, 1, 0),
   Z: new Vector3(0, 0, 1),
 };
-const LEAST_FACTOR = 0.02;
-const MOST_FACTOR = 50;
+const MIN_SCALE_FACTOR = 0.02;
+const MAX_SCALE_FACTOR = 50;
 
 /** The translation between two positions of the gizmo. */
-export function translation(from: Vector3, to: Vector3): Operation {
-  return { kind: "translate", by: tidied(to.clone().sub(from)) };
+export function translationBetween(from: Vector3, to: Vector3): Operation {
+  return { kind: "translate", by: roundVector(to.clone().sub(from)) };
 }
 
 /**
- * The rotation between two orientations of the gizmo, which stands along `axes`. Turned about one of its
- * axes ("X", "Y" or "Z") it is that angle alone, else intrinsic XYZ angles.
+ * The rotation between two orientations of the gizmo, whose axes are `axes`. A rotation about one of the gizmo's axes
+ * ("X", "Y" or "Z") has that angle alone, any other intrinsic XYZ angles.
  */
-export function rotation(from: Quaternion, to: Quaternion, axes: Axes, about: string): Operation {
+export function rotationBetween(from: Quaternion, to: Quaternion, axes: Axes, about: string): Operation {
   const turn = from.clone().invert().multiply(to);
-  const axis: Vector3 | undefined = UNIT[about];
-  if (!(about in UNIT)) return { kind: "rotate", rotation_deg: degrees(turn), axes };
+  const axis: Vector3 | undefined = UNIT_VECTORS[about];
+  if (!(about in UNIT_VECTORS)) return { kind: "rotate", rotation_deg: degreesFromQuaternion(turn), axes };
   const angle = 2 * Math.atan2(new Vector3(turn.x, turn.y, turn.z).dot(axis), turn.w) * (180 / Math.PI);
   const wrapped = angle > 180 ? angle - 360 : angle <= -180 ? angle + 360 : angle;
-  return { kind: "rotate", rotation_deg: tidied(axis.clone().multiplyScalar(wrapped)), axes };
+  return { kind: "rotate", rotation_deg: roundVector(axis.clone().multiplyScalar(wrapped)), axes };
 }
 
-/** The scaling that the gizmo's factors mean, a fiftieth to fifty along each axis. */
-export function scaling(factors: Vector3, axes: Axes): Operation {
-  const by = factors.toArray().map((s) => tidy(Math.min(Math.max(s, LEAST_FACTOR), MOST_FACTOR))) as Vec3;
+/** The scaling by the gizmo's factors, each within [1/50, 50]. */
+export function scalingBy(factors: Vector3, axes: Axes): Operation {
+  const by = factors
+    .toArray()
+    .map((s) => roundDecimals(Math.min(Math.max(s, MIN_SCALE_FACTOR), MAX_SCALE_FACTOR))) as Vec3;
   return { kind: "scale", by, axes };
 }
 
-/** The move of some corners. */
-export function cornersMove(corners: readonly number[], by: Vector3): Operation {
-  return { kind: "move_corners", corners: [...corners].sort((a, b) => a - b), by: tidied(by) };
+/** The motion of some corners by a vector. */
+export function moveCornersBy(corners: readonly number[], by: Vector3): Operation {
+  return { kind: "move_corners", corners: [...corners].sort((a, b) => a - b), by: roundVector(by) };
 }
 
-/** Where a ray meets the plane through a point, or null where it runs along or away from it. */
-export function onPlane(ray: Ray, point: Vector3, normal: Vector3): Vector3 | null {
+/** Intersection of a ray with the plane through a point; null for a parallel ray, or a plane behind it. */
+export function intersectPlane(ray: Ray, point: Vector3, normal: Vector3): Vector3 | null {
   const slope = ray.direction.dot(normal);
   const distance = point.clone().sub(ray.origin).dot(normal) / slope;
   if (Math.abs(slope) < 1e-9 || distance < 0) return null;
   return ray.at(distance, new Vector3());
 }
 
-/** The point of a line that is nearest to a ray, or null where they are parallel. */
-export function onLine(ray: Ray, point: Vector3, direction: Vector3): Vector3 | null {
+/** The point of a line closest to a ray; null for a parallel ray. */
+export function closestPointOnLine(ray: Ray, point: Vector3, direction: Vector3): Vector3 | null {
   const across = direction.clone().cross(ray.direction);
   const size = across.lengthSq();
   if (size < 1e-9 * direction.lengthSq()) return null;
@@ -57,6 +59,6 @@ export function onLine(ray: Ray, point: Vector3, direction: Vector3): Vector3 | 
   return point.clone().addScaledVector(direction, t);
 }
 
-function tidied(v: Vector3): Vec3 {
-  return v.toArray().map((x) => tidy(x)) as Vec3;
+function roundVector(v: Vector3): Vec3 {
+  return v.toArray().map((x) => roundDecimals(x)) as Vec3;
 }

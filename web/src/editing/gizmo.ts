@@ -1,4 +1,4 @@
-/** The gizmo on the selected cage: three's TransformControls, told where to stand and asked what it was moved by. */
+/** Gizmo of the selected cage: three's TransformControls, whose motions become operations. */
 import {
   Mesh,
   Object3D,
@@ -10,32 +10,32 @@ import {
   type Scene,
 } from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
-import { orientation } from "./cage";
-import { cornersMove, rotation, scaling, translation } from "./gestures";
+import { nearestRotation } from "./cage";
+import { moveCornersBy, rotationBetween, scalingBy, translationBetween } from "./gestures";
 import type { Axes, Operation, Posed } from "./operations";
 import type { Tool } from "../app/store";
 
-/** Logarithm of the uniform factor for half the height of the view. */
-const UNIFORM_SPEED = 2;
+/** Logarithm of the uniform scale factor per half height of the view. */
+const UNIFORM_SCALE_RATE = 2;
 
-interface Device {
+interface DevicePoint {
   x: number;
   y: number;
 }
 
-/** The parts of three's controls that its types leave out or narrow to DOM events. */
-interface Inner {
-  pointerHover(pointer: Device & { button: number }): void;
-  pointerDown(pointer: Device & { button: number }): void;
-  pointerMove(pointer: Device & { button: number }): void;
-  pointerUp(pointer: Device & { button: number }): void;
+/** Members of three's controls that its types omit or restrict to DOM events. */
+interface UntypedControls {
+  pointerHover(pointer: DevicePoint & { button: number }): void;
+  pointerDown(pointer: DevicePoint & { button: number }): void;
+  pointerMove(pointer: DevicePoint & { button: number }): void;
+  pointerUp(pointer: DevicePoint & { button: number }): void;
   _gizmo: { picker: Record<string, Object3D> };
 }
 
 export class Gizmo {
   private readonly proxy = new Object3D();
   private readonly controls: TransformControls;
-  private readonly from = { position: new Vector3(), quaternion: new Quaternion(), device: { x: 0, y: 0 } };
+  private readonly start = { position: new Vector3(), quaternion: new Quaternion(), device: { x: 0, y: 0 } };
   private axes: Axes = "world";
 
   constructor(
@@ -49,23 +49,23 @@ export class Gizmo {
     scene.add(this.proxy, this.controls.getHelper());
   }
 
-  /** Stands on a cage's pivot, along the world's or the cage's axes; or between some of its corners. */
+  /** Shows the gizmo at a position, by default the cage's pivot, along the world's or the cage's axes. */
   show(tool: Tool, axes: Axes, cage: Posed, at: Vector3 | null): void {
     if (this.dragging) return;
     this.axes = axes;
     this.controls.mode = at !== null || tool === "select" ? "translate" : tool;
     this.proxy.position.copy(at ?? new Vector3(...cage.pivot));
-    this.proxy.quaternion.copy(axes === "cage" ? orientation(cage.corners) : new Quaternion());
+    this.proxy.quaternion.copy(axes === "cage" ? nearestRotation(cage.corners) : new Quaternion());
     this.proxy.scale.set(1, 1, 1);
     this.proxy.updateMatrixWorld();
-    if (!this.shown) this.controls.attach(this.proxy);
+    if (!this.isShown) this.controls.attach(this.proxy);
   }
 
   hide(): void {
-    if (this.shown && !this.dragging) this.controls.detach();
+    if (this.isShown && !this.dragging) this.controls.detach();
   }
 
-  get shown(): boolean {
+  get isShown(): boolean {
     return (this.controls.object as Object3D | undefined) !== undefined;
   }
 
@@ -73,74 +73,74 @@ export class Gizmo {
     return this.controls.dragging;
   }
 
-  /** The handle that the mouse is over, which is then highlighted: "X", "XY", "XYZ", "E" and so on, or null. */
-  hover(device: Device): string | null {
-    if (!this.shown) return null;
-    this.inner.pointerHover({ ...device, button: -1 });
+  /** Highlights and returns the handle under the mouse: "X", "XY", "XYZ", "E" and so on, or null. */
+  hover(device: DevicePoint): string | null {
+    if (!this.isShown) return null;
+    this.untyped.pointerHover({ ...device, button: -1 });
     return this.axis;
   }
 
-  /** Takes the highlight off. */
-  leave(): void {
+  /** Removes the highlight. */
+  clearHover(): void {
     if (!this.dragging) this.controls.axis = null;
   }
 
-  /** The handle that is highlighted, or held. */
+  /** The handle that is highlighted or dragged. */
   get axis(): string | null {
     return this.controls.axis;
   }
 
-  begin(device: Device): void {
-    this.from.position.copy(this.proxy.position);
-    this.from.quaternion.copy(this.proxy.quaternion);
-    this.from.device = { x: device.x, y: device.y };
-    this.inner.pointerDown({ ...device, button: 0 });
+  begin(device: DevicePoint): void {
+    this.start.position.copy(this.proxy.position);
+    this.start.quaternion.copy(this.proxy.quaternion);
+    this.start.device = { x: device.x, y: device.y };
+    this.untyped.pointerDown({ ...device, button: 0 });
   }
 
-  /** The whole operation since `begin`; of some corners where those were meant. */
-  move(device: Device, corners: readonly number[]): Operation {
-    this.inner.pointerMove({ ...device, button: -1 });
-    const { proxy, from } = this;
+  /** The whole operation since `begin`; a motion of corners if some are given. */
+  move(device: DevicePoint, corners: readonly number[]): Operation {
+    this.untyped.pointerMove({ ...device, button: -1 });
+    const { proxy, start: from } = this;
     switch (this.controls.mode) {
       case "translate":
         return corners.length > 0
-          ? cornersMove(corners, proxy.position.clone().sub(from.position))
-          : translation(from.position, proxy.position);
+          ? moveCornersBy(corners, proxy.position.clone().sub(from.position))
+          : translationBetween(from.position, proxy.position);
       case "rotate":
-        return rotation(from.quaternion, proxy.quaternion, this.axes, this.axis ?? "");
+        return rotationBetween(from.quaternion, proxy.quaternion, this.axes, this.axis ?? "");
       case "scale":
-        return scaling(this.axis === "XYZ" ? this.uniform(device) : proxy.scale, this.axes);
+        return scalingBy(this.axis === "XYZ" ? this.uniformFactors(device) : proxy.scale, this.axes);
     }
   }
 
-  /** Factors of a uniform scaling: larger to the right and up, wherever the mouse took hold. */
-  private uniform(device: Device): Vector3 {
-    const { x, y } = this.from.device;
-    const factor = Math.exp(UNIFORM_SPEED * ((device.x - x) * this.camera.aspect + (device.y - y)));
+  /** Factors of a uniform scaling, which grow with a motion to the right and up. */
+  private uniformFactors(device: DevicePoint): Vector3 {
+    const { x, y } = this.start.device;
+    const factor = Math.exp(UNIFORM_SCALE_RATE * ((device.x - x) * this.camera.aspect + (device.y - y)));
     return new Vector3(factor, factor, factor);
   }
 
-  /** Stands where the drag could be followed to. */
-  settle(pivot: Vector3): void {
+  /** Moves the gizmo to the point that the drag has reached. */
+  moveTo(pivot: Vector3): void {
     this.proxy.position.copy(pivot);
     this.proxy.updateMatrixWorld();
   }
 
-  end(device: Device): void {
-    this.inner.pointerUp({ ...device, button: 0 });
+  end(device: DevicePoint): void {
+    this.untyped.pointerUp({ ...device, button: 0 });
     this.controls.axis = null;
   }
 
   /**
-   * A place, in normalised device coordinates, where the mouse takes hold of a handle, and around which it
-   * still does at a distance of `slack`; null if there is none. Only free places count.
+   * A point in normalized device coordinates that is on a handle, as are its neighbors at a distance of `slack`; null
+   * without such a point. `free` excludes points under other handles.
    */
-  grip(axis: string, slack: Device, free: (device: Device) => boolean): Device | null {
-    const picker = this.inner._gizmo.picker[this.controls.mode];
+  grip(axis: string, slack: DevicePoint, free: (device: DevicePoint) => boolean): DevicePoint | null {
+    const picker = this.untyped._gizmo.picker[this.controls.mode];
     this.controls.getHelper().updateMatrixWorld(true);
     const handles = picker.children.filter((child): child is Mesh => child instanceof Mesh);
     const ray = new Raycaster();
-    const holds = (at: Device): boolean => {
+    const holds = (at: DevicePoint): boolean => {
       ray.setFromCamera(new Vector2(at.x, at.y), this.camera);
       return ray.intersectObjects(handles, false).find((found) => found.object.visible)?.object.name === axis;
     };
@@ -162,7 +162,7 @@ export class Gizmo {
     return null;
   }
 
-  private get inner(): Inner {
-    return this.controls as unknown as Inner;
+  private get untyped(): UntypedControls {
+    return this.controls as unknown as UntypedControls;
   }
 }

@@ -7,9 +7,9 @@ const REQUEST_INTERVAL_MS = 150;
 
 export class Grid {
   private edit = 0;
-  private key = "";
+  private requestKey = "";
   private lines: Vec3[][] = [];
-  private asking = false;
+  private isWaiting = false;
 
   constructor(
     private readonly ask: (edit: number) => Promise<Answer | null>,
@@ -18,7 +18,7 @@ export class Grid {
 
   /** Makes the next call of `linesFor` request new lines. */
   clear(): void {
-    this.key = "";
+    this.requestKey = "";
   }
 
   /** The last lines received for an edit; new ones are requested if its cages have moved since. */
@@ -30,14 +30,14 @@ export class Grid {
     }
     const { inner, shell, falloff, width } = edit;
     const key = JSON.stringify([edit.id, deformed.corners, outer.corners, inner, shell, falloff, width]);
-    if (key !== this.key && !this.asking) {
-      this.key = key;
-      this.asking = true;
+    if (key !== this.requestKey && !this.isWaiting) {
+      this.requestKey = key;
+      this.isWaiting = true;
       void this.ask(edit.id).then((answer) => {
         if (answer !== null && this.edit === edit.id) this.lines = answer.grid;
         this.changed();
         setTimeout(() => {
-          this.asking = false;
+          this.isWaiting = false;
           this.changed();
         }, REQUEST_INTERVAL_MS);
       });

@@ -1,4 +1,4 @@
-/** Dots on corners, squares on faces: what can be grabbed, always on top. */
+/** Handles of cages: dots on corners and squares on faces, drawn on top of everything. */
 import {
   BufferAttribute,
   BufferGeometry,
@@ -12,7 +12,7 @@ import type { Vec3 } from "../net/protocol";
 import type { Viewport } from "../frames/viewport";
 
 export interface Dot {
-  at: Vec3;
+  position: Vec3;
   colour: Color;
   /** CSS pixels across. */
   size: number;
@@ -20,7 +20,7 @@ export interface Dot {
   filled: boolean;
 }
 
-const MOST = 512;
+const MAX_DOTS = 512;
 
 const VERTEX = `
 uniform float scale;
@@ -57,9 +57,9 @@ void main() {
 
 export class Handles {
   private readonly geometry = new BufferGeometry();
-  private readonly position = new BufferAttribute(new Float32Array(MOST * 3), 3);
-  private readonly paint = new BufferAttribute(new Float32Array(MOST * 4), 4);
-  private readonly form = new BufferAttribute(new Float32Array(MOST), 1);
+  private readonly position = new BufferAttribute(new Float32Array(MAX_DOTS * 3), 3);
+  private readonly paint = new BufferAttribute(new Float32Array(MAX_DOTS * 4), 4);
+  private readonly form = new BufferAttribute(new Float32Array(MAX_DOTS), 1);
 
   constructor(viewport: Viewport) {
     for (const attribute of [this.position, this.paint, this.form]) attribute.setUsage(DynamicDrawUsage);
@@ -84,11 +84,11 @@ export class Handles {
     });
   }
 
-  /** Shows these dots in place of the ones before. */
+  /** Replaces the drawn dots. */
   set(dots: readonly Dot[]): void {
-    const shown = dots.slice(0, MOST);
+    const shown = dots.slice(0, MAX_DOTS);
     shown.forEach((dot, i) => {
-      this.position.setXYZ(i, ...dot.at);
+      this.position.setXYZ(i, ...dot.position);
       this.paint.setXYZW(i, dot.colour.r, dot.colour.g, dot.colour.b, dot.size);
       this.form.setX(i, (dot.shape === "square" ? 2 : 0) + (dot.filled ? 1 : 0));
     });

@@ -1,22 +1,22 @@
-/** Keys: one table, for doing and for the page that shows them. */
+/** Key bindings: one table for the actions and for the help page. */
 import type { Actions } from "./actions";
 import type { App } from "../app/app";
 import type { Pointer } from "./pointer";
-import { LOOKING, looking } from "../app/store";
+import { READ_ONLY_NOTICE, isReadOnly } from "../app/store";
 import type { Dialogs } from "../ui/dialogs";
 
-/** Keys beside those of the view that pages have which may not change anything. */
-const OF_LOOKERS = ["Escape", "Ctrl+C", "?"];
+/** Keys that read-only pages have in addition to those of the view. */
+const READ_ONLY_KEYS = ["Escape", "Ctrl+C", "?"];
 
 export interface Binding {
-  /** As shown: "Ctrl+Shift+Z". Several may do the same. */
+  /** Keys with the same action, as the help shows them: "Ctrl+Shift+Z". */
   keys: string[];
-  what: string;
+  action: string;
   group: "Tools" | "Cages" | "Edits" | "View" | "Scene";
   run: () => void;
 }
 
-/** All bindings. Letters that have another meaning during a drag are not among them. */
+/** All bindings, apart from the letters that constrain a drag. */
 export function bindings(
   app: App,
   actions: Actions,
@@ -24,103 +24,108 @@ export function bindings(
   dialogs: Pick<Dialogs, "saveAs" | "paste">,
 ): Binding[] {
   return [
-    { group: "Tools", keys: ["1", "G"], what: "Move", run: () => actions.tool("translate") },
-    { group: "Tools", keys: ["2", "R"], what: "Rotate", run: () => actions.tool("rotate") },
-    { group: "Tools", keys: ["3", "S"], what: "Scale", run: () => actions.tool("scale") },
-    { group: "Tools", keys: ["4", "Q"], what: "Select: no gizmo", run: () => actions.tool("select") },
-    { group: "Tools", keys: ["Tab"], what: "Set mode or Edit mode", run: () => actions.toggleMode() },
-    { group: "Tools", keys: ["W"], what: "World axes or cage axes", run: () => actions.toggleAxes() },
+    { group: "Tools", keys: ["1", "G"], action: "Move", run: () => actions.setTool("translate") },
+    { group: "Tools", keys: ["2", "R"], action: "Rotate", run: () => actions.setTool("rotate") },
+    { group: "Tools", keys: ["3", "S"], action: "Scale", run: () => actions.setTool("scale") },
+    { group: "Tools", keys: ["4", "Q"], action: "Select: no gizmo", run: () => actions.setTool("select") },
+    { group: "Tools", keys: ["Tab"], action: "Set mode or Edit mode", run: () => actions.toggleMode() },
+    { group: "Tools", keys: ["W"], action: "World axes or cage axes", run: () => actions.toggleAxes() },
     {
       group: "Tools",
       keys: ["Escape"],
-      what: "Cancel the drag; clear the selection",
+      action: "Cancel the drag; clear the selection",
       run: () => actions.escape(() => pointer.cancel()),
     },
     {
       group: "Cages",
       keys: ["C"],
-      what: "Set mode: inner cage, outer cage, both",
+      action: "Set mode: inner cage, outer cage, both",
       run: () => actions.nextCage(),
     },
     {
       group: "Cages",
       keys: ["I"],
-      what: "Fit the inner cage to what is dense inside it",
+      action: "Fit the inner cage to the dense part of its content",
       run: () => actions.fitInner(),
     },
-    { group: "Edits", keys: ["D"], what: "Discrete or continuous", run: () => actions.toggleKind() },
+    { group: "Edits", keys: ["D"], action: "Discrete or continuous", run: () => actions.toggleKind() },
     {
       group: "Edits",
       keys: ["U"],
-      what: "Fill what is uncovered, or leave it",
+      action: "Fill what is uncovered, or leave it",
       run: () => actions.toggleFill(),
     },
     {
       group: "Edits",
       keys: ["Shift+U"],
-      what: "Shadows go along, or stay",
+      action: "Shadows go along, or stay",
       run: () => actions.toggleShadows(),
     },
-    { group: "Edits", keys: ["H"], what: "Hide or show", run: () => actions.hide() },
-    { group: "Edits", keys: ["Delete", "Backspace"], what: "Remove", run: () => actions.remove() },
-    { group: "Edits", keys: ["Ctrl+D"], what: "Duplicate", run: () => actions.duplicate() },
-    { group: "Edits", keys: ["Ctrl+C"], what: "Copy as text; Ctrl+V pastes", run: () => actions.copy() },
-    { group: "Edits", keys: ["Shift+V"], what: "Paste from another scene", run: () => dialogs.paste() },
-    { group: "Edits", keys: ["Ctrl+Z"], what: "Undo", run: () => actions.command("undo") },
-    { group: "Edits", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], what: "Redo", run: () => actions.command("redo") },
+    { group: "Edits", keys: ["H"], action: "Hide or show", run: () => actions.toggleEnabled() },
+    { group: "Edits", keys: ["Delete", "Backspace"], action: "Remove", run: () => actions.removeSelected() },
+    { group: "Edits", keys: ["Ctrl+D"], action: "Duplicate", run: () => actions.duplicate() },
+    { group: "Edits", keys: ["Ctrl+C"], action: "Copy as text; Ctrl+V pastes", run: () => actions.copy() },
+    { group: "Edits", keys: ["Shift+V"], action: "Paste from another scene", run: () => dialogs.paste() },
+    { group: "Edits", keys: ["Ctrl+Z"], action: "Undo", run: () => actions.command("undo") },
+    { group: "Edits", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], action: "Redo", run: () => actions.command("redo") },
     {
       group: "View",
       keys: ["F"],
-      what: "Focus on the cage, or on the surface under the mouse",
-      run: () => actions.focus(pointer.at.x, pointer.at.y),
+      action: "Focus on the cage, or on the surface under the mouse",
+      run: () => actions.focus(pointer.position.x, pointer.position.y),
     },
-    { group: "View", keys: ["V"], what: "Colour, depth, opacity, normals", run: () => actions.nextView() },
-    { group: "View", keys: ["L"], what: "Deformed lattice", run: () => actions.toggle("grid") },
-    { group: "View", keys: ["O"], what: "Show or hide the cages", run: () => actions.toggle("cages") },
-    { group: "View", keys: ["P"], what: "Before and after, side by side", run: () => actions.toggleSplit() },
-    { group: "View", keys: ["N"], what: "Show or hide the panel", run: () => actions.toggle("panel") },
-    { group: "View", keys: ["Home"], what: "Look from the start", run: () => actions.lookFrom(null) },
-    { group: "View", keys: ["["], what: "Previous camera of the scene", run: () => actions.lookFrom(-1) },
-    { group: "View", keys: ["]"], what: "Next camera of the scene", run: () => actions.lookFrom(1) },
-    { group: "Scene", keys: ["Ctrl+S"], what: "Save", run: () => actions.save() },
-    { group: "Scene", keys: ["Ctrl+Shift+S"], what: "Save as", run: () => dialogs.saveAs() },
-    { group: "Scene", keys: ["K"], what: "Keyframe of the camera path", run: () => actions.addKey() },
+    { group: "View", keys: ["V"], action: "Colour, depth, opacity, normals", run: () => actions.nextView() },
+    { group: "View", keys: ["L"], action: "Deformed lattice", run: () => actions.toggle("grid") },
+    { group: "View", keys: ["O"], action: "Show or hide the cages", run: () => actions.toggle("cages") },
+    {
+      group: "View",
+      keys: ["P"],
+      action: "Before and after, side by side",
+      run: () => actions.toggleSplit(),
+    },
+    { group: "View", keys: ["N"], action: "Show or hide the panel", run: () => actions.toggle("panel") },
+    { group: "View", keys: ["Home"], action: "Look from the start", run: () => actions.lookFrom(null) },
+    { group: "View", keys: ["["], action: "Previous camera of the scene", run: () => actions.lookFrom(-1) },
+    { group: "View", keys: ["]"], action: "Next camera of the scene", run: () => actions.lookFrom(1) },
+    { group: "Scene", keys: ["Ctrl+S"], action: "Save", run: () => actions.save() },
+    { group: "Scene", keys: ["Ctrl+Shift+S"], action: "Save as", run: () => dialogs.saveAs() },
+    { group: "Scene", keys: ["K"], action: "Keyframe of the camera path", run: () => actions.addKey() },
     {
       group: "Scene",
       keys: ["?"],
-      what: "All keys",
+      action: "All keys",
       run: () => app.store.set({ help: !app.store.now.help }),
     },
   ];
 }
 
-/** What the mouse does with a key held; shown with the others. */
-export const HELD: { keys: string[]; what: string }[] = [
-  { keys: ["B"], what: "Before the edits, while held" },
-  { keys: ["Ctrl"], what: "While dragging: snap (15°, tenths, round lengths)" },
-  { keys: ["X", "Y", "Z"], what: "While dragging a corner, edge or face: along this axis" },
-  { keys: ["Shift+click"], what: "Choose corners, edges and faces to drag together" },
-  { keys: ["Double-click"], what: "A new pair of cages around the surface there" },
-  { keys: ["Left", "Right", "Wheel"], what: "Orbit, pan, zoom" },
+/** Actions of the mouse, some with a key held; the help shows them with the keys. */
+export const MOUSE_BINDINGS: { keys: string[]; action: string }[] = [
+  { keys: ["B"], action: "Before the edits, while held" },
+  { keys: ["Ctrl"], action: "While dragging: snap (15°, tenths, round lengths)" },
+  { keys: ["X", "Y", "Z"], action: "While dragging a corner, edge or face: along this axis" },
+  { keys: ["Shift+click"], action: "Choose corners, edges and faces to drag together" },
+  { keys: ["Double-click"], action: "A new pair of cages around the surface there" },
+  { keys: ["Left", "Right", "Wheel"], action: "Orbit, pan, zoom" },
 ];
 
-/** The event's key as bindings write it. */
-export function named(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" | "shiftKey">): string {
+/** Name of an event's key in the notation of the bindings. */
+export function keyName(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" | "shiftKey">): string {
   const key = event.key.length === 1 ? event.key.toUpperCase() : event.key;
   const control = event.ctrlKey || event.metaKey ? "Ctrl+" : "";
   const shift = event.shiftKey && /^[A-Z]$/.test(key) ? "Shift+" : "";
   return control + shift + key;
 }
 
-/** Listens for keys, except where somebody types. */
+/** Listens for keys, except while the user types into a field. */
 export function listenForKeys(app: App, actions: Actions, pointer: Pointer, all: Binding[]): void {
   const byKey = new Map(all.flatMap((binding) => binding.keys.map((key) => [key, binding] as const)));
   addEventListener("keydown", (event) => {
     if (isTyping(event.target)) {
-      if (event.key === "Enter") leave(event.target);
+      if (event.key === "Enter") blurLater(event.target);
       return;
     }
-    const name = named(event);
+    const name = keyName(event);
     if (event.key === "Control") return snap(true);
     if (name === "B" && !event.repeat) return app.store.set({ before: true });
     if ((name === "X" || name === "Y" || name === "Z") && pointer.constrain(name)) return;
@@ -129,8 +134,8 @@ export function listenForKeys(app: App, actions: Actions, pointer: Pointer, all:
     const binding = byKey.get(name);
     if (!binding) return;
     event.preventDefault();
-    if (looking(app.store.now) && binding.group !== "View" && !OF_LOOKERS.includes(name))
-      return app.say(LOOKING, "warning");
+    if (isReadOnly(app.store.now) && binding.group !== "View" && !READ_ONLY_KEYS.includes(name))
+      return app.say(READ_ONLY_NOTICE, "warning");
     if (!event.repeat || name.endsWith("Z")) binding.run();
   });
   addEventListener("keyup", (event) => {
@@ -144,12 +149,12 @@ export function listenForKeys(app: App, actions: Actions, pointer: Pointer, all:
 
   function snap(held: boolean): void {
     pointer.snapKey = held;
-    pointer.follow();
+    pointer.applyMotion();
   }
 }
 
-/** Lets the keys be shortcuts again after a field was filled in. */
-function leave(field: EventTarget | null): void {
+/** Removes the focus from a field after the Enter key, so that keys are shortcuts again. */
+function blurLater(field: EventTarget | null): void {
   if (field instanceof HTMLInputElement) setTimeout(() => field.blur());
 }
 

@@ -1,32 +1,32 @@
 /**
- * How far a drag may go, told before the server's answer: by the outer cage, which is known here, and by
- * what the server last let through. The server's answer is what holds.
+ * Estimated limit of a drag, ahead of the server's answer: from the outer cage, and from the share that the server
+ * granted last. The server's answer is authoritative.
  */
 import { Matrix3, Vector3 } from "three";
-import { amount, apply, part, type Operation, type Posed } from "./operations";
+import { operationSize, apply, scaleOperation, type Operation, type Posed } from "./operations";
 import type { Corners, Vec3 } from "../net/protocol";
 
-const SLACK = 1e-9;
+const COORDINATE_TOLERANCE = 1e-9;
 
-/** Whether a point is in the cage: the trilinear map is inverted by Newton's method. */
+/** Whether a point lies in the cage; Newton's method inverts the trilinear map. */
 export function contains(corners: Corners, point: Vec3): boolean {
   const target = new Vector3(...point);
   const u = new Vector3(0.5, 0.5, 0.5);
   for (let step = 0; step < 20; step++) {
-    const { position, jacobian } = evaluate(corners, u);
+    const { position, jacobian } = trilinearMap(corners, u);
     const change = target.clone().sub(position).applyMatrix3(jacobian.invert());
     u.add(change).clampScalar(-1, 2);
     if (change.lengthSq() < 1e-24) break;
   }
-  if (evaluate(corners, u).position.distanceTo(target) > 1e-6) return false;
-  return [u.x, u.y, u.z].every((x) => x >= -SLACK && x <= 1 + SLACK);
+  if (trilinearMap(corners, u).position.distanceTo(target) > 1e-6) return false;
+  return [u.x, u.y, u.z].every((x) => x >= -COORDINATE_TOLERANCE && x <= 1 + COORDINATE_TOLERANCE);
 }
 
-/** Largest share of the operation, to 1e-3, up to which the cage stays in the outer cage; 1 without one. */
-export function containedPart(operation: Operation, cage: Posed, outer: Corners | null): number {
+/** Largest share of the operation, to 1e-3, for which the cage stays inside the outer cage; 1 without an outer cage. */
+export function containedShare(operation: Operation, cage: Posed, outer: Corners | null): number {
   if (outer === null) return 1;
   const inside = (t: number): boolean =>
-    apply(part(operation, t), cage).corners.every((corner) => contains(outer, corner));
+    apply(scaleOperation(operation, t), cage).corners.every((corner) => contains(outer, corner));
   if (inside(1) || !inside(0)) return 1;
   const steps = operation.kind === "rotate" ? 16 : 4;
   let high = 1;
@@ -45,17 +45,17 @@ export function containedPart(operation: Operation, cage: Posed, outer: Corners 
   return low;
 }
 
-/** The share of an operation that the server will let through, judged from what it let through of another. */
-export function expectedPart(
+/** Estimated share of an operation that the server will grant, from the granted share of the last operation. */
+export function expectedShare(
   operation: Operation,
   last: { operation: Operation; part: number } | null,
 ): number {
   if (last === null || last.part >= 1 || last.operation.kind !== operation.kind) return 1;
-  const size = amount(operation);
-  return size > 0 ? Math.min(1, (last.part * amount(last.operation)) / size) : 1;
+  const size = operationSize(operation);
+  return size > 0 ? Math.min(1, (last.part * operationSize(last.operation)) / size) : 1;
 }
 
-function evaluate(corners: Corners, u: Vector3): { position: Vector3; jacobian: Matrix3 } {
+function trilinearMap(corners: Corners, u: Vector3): { position: Vector3; jacobian: Matrix3 } {
   const position = new Vector3();
   const columns = [new Vector3(), new Vector3(), new Vector3()];
   const w = [u.x, u.y, u.z];

@@ -1,8 +1,8 @@
 /**
- * Thick lines that know what of them the field hides: the visible part solid, the hidden part thin and dashed.
+ * Thick lines with hidden-line rendering against the field: visible parts are solid, hidden parts thin and dashed.
  *
- * A point of a line is hidden where the picture's distance along the same ray, seen from where the picture
- * was taken, is shorter. Widths are CSS pixels, edges are smoothed in the shader. Segments are drawn in order.
+ * A point of a line is hidden if the image has a shorter distance along the ray from the image's own camera to the
+ * point. Widths are in CSS pixels, the shader smooths the edges, and segments are drawn in order.
  */
 import {
   Color,
@@ -17,7 +17,7 @@ import {
   Vector3,
   type IUniform,
 } from "three";
-import { NOTHING } from "../frames/depth_image";
+import { EMPTY_DISTANCE } from "../frames/depth_image";
 import type { Pictures } from "../frames/pictures";
 import type { Vec3 } from "../net/protocol";
 import type { Viewport } from "../frames/viewport";
@@ -26,12 +26,12 @@ export interface Segment {
   from: Vec3;
   to: Vec3;
   colour: Color;
-  /** CSS pixels, of the visible part. */
+  /** Width of the visible part, CSS pixels. */
   width: number;
   /** Opacity of the visible part. */
   alpha: number;
   /** Opacity of the hidden part. */
-  hidden: number;
+  hiddenAlpha: number;
 }
 
 const VERTEX = `
@@ -92,7 +92,7 @@ bool isHidden() {
   vec2 at = 0.5 + 0.5 * clip.xy / clip.w;
   if (any(lessThan(at, vec2(0.0))) || any(greaterThan(at, vec2(1.0)))) return false;
   float seen = texture(depthMap, vec2(at.x, 1.0 - at.y)).r;
-  if (seen >= ${(0.5 * NOTHING).toFixed(1)}) return false;
+  if (seen >= ${(0.5 * EMPTY_DISTANCE).toFixed(1)}) return false;
   float own = length(world - pictureEye);
   return own > seen * 1.003 + slack;
 }
@@ -112,7 +112,7 @@ void main() {
 }`;
 
 export class Lines {
-  /** Four vertices a segment; instances would be a draw each where the processor draws. */
+  /** Four vertices per segment: a software renderer draws instances one by one. */
   private readonly geometry = new BufferGeometry();
   private readonly mesh: Mesh;
   private buffers: {
@@ -122,13 +122,13 @@ export class Lines {
     stroke: BufferAttribute;
   };
   private capacity = 0;
-  private readonly shared: Record<string, IUniform>;
+  private readonly uniforms: Record<string, IUniform>;
 
   constructor(
     private readonly viewport: Viewport,
     private readonly pictures: Pictures,
   ) {
-    this.shared = {
+    this.uniforms = {
       viewport: { value: new Vector2() },
       depthMap: { value: pictures.depthTexture },
       pictureProjection: { value: new Matrix4() },
@@ -136,7 +136,7 @@ export class Lines {
       slack: { value: 0.01 },
       scale: { value: 1 },
     };
-    this.buffers = this.grow(64);
+    this.buffers = this.allocate(64);
     const material = new ShaderMaterial({
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
@@ -144,23 +144,23 @@ export class Lines {
       transparent: true,
       depthTest: false,
       depthWrite: false,
-      uniforms: this.shared,
+      uniforms: this.uniforms,
     });
     this.mesh = new Mesh(this.geometry, material);
     this.mesh.frustumCulled = false;
     this.mesh.renderOrder = 1;
     viewport.scene.add(this.mesh);
-    viewport.beforeFrame.push(() => this.follow());
+    viewport.beforeFrame.push(() => this.updateUniforms());
   }
 
-  /** How much nearer than a line the field must be to hide it, world units. */
+  /** Distance by which the field must be in front of a line to hide it, world units. */
   set slack(value: number) {
-    this.shared.slack.value = value;
+    this.uniforms.slack.value = value;
   }
 
-  /** Shows these segments in place of the ones before. */
+  /** Replaces the drawn segments. */
   set(segments: readonly Segment[]): void {
-    if (segments.length > this.capacity) this.buffers = this.grow(2 * segments.length);
+    if (segments.length > this.capacity) this.buffers = this.allocate(2 * segments.length);
     const { from, to, paint, stroke } = this.buffers;
     const scale = this.viewport.renderer.getPixelRatio();
     segments.forEach((segment, n) => {
@@ -169,7 +169,7 @@ export class Lines {
         from.setXYZ(i, ...segment.from);
         to.setXYZ(i, ...segment.to);
         paint.setXYZW(i, r, g, b, segment.alpha);
-        stroke.setXY(i, segment.width * scale, segment.hidden);
+        stroke.setXY(i, segment.width * scale, segment.hiddenAlpha);
       }
     });
     for (const buffer of Object.values(this.buffers)) buffer.needsUpdate = true;
@@ -177,7 +177,7 @@ export class Lines {
     this.mesh.visible = segments.length > 0;
   }
 
-  private grow(capacity: number): Lines["buffers"] {
+  private allocate(capacity: number): Lines["buffers"] {
     this.capacity = capacity;
     const make = (name: string, size: number): BufferAttribute => {
       const attribute = new BufferAttribute(new Float32Array(4 * capacity * size), size);
@@ -195,18 +195,18 @@ export class Lines {
     return { from: make("from", 3), to: make("to", 3), paint: make("paint", 4), stroke: make("stroke", 2) };
   }
 
-  private follow(): void {
+  private updateUniforms(): void {
     const { width, height } = this.viewport.pixels;
-    (this.shared.viewport.value as Vector2).set(width, height);
-    this.shared.scale.value = this.viewport.renderer.getPixelRatio();
+    (this.uniforms.viewport.value as Vector2).set(width, height);
+    this.uniforms.scale.value = this.viewport.renderer.getPixelRatio();
     const { viewpoint } = this.pictures;
     if (viewpoint === null) return;
-    (this.shared.pictureProjection.value as Matrix4).copy(viewpoint.viewProjection);
-    (this.shared.pictureEye.value as Vector3).copy(viewpoint.eye);
+    (this.uniforms.pictureProjection.value as Matrix4).copy(viewpoint.viewProjection);
+    (this.uniforms.pictureEye.value as Vector3).copy(viewpoint.eye);
   }
 }
 
-/** An sRGB colour as it is, not made linear: lines are drawn over sRGB pictures. */
+/** An sRGB color without conversion to linear values: lines are drawn over sRGB images. */
 export function colour(text: string): Color {
   return new Color(text).convertLinearToSRGB();
 }

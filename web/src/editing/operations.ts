@@ -1,9 +1,9 @@
 /**
- * Operations on a cage, as the server does them: so that the lines can move before its answer. Angles are
- * degrees, intrinsic XYZ; turning, scaling and shearing are about the cage's pivot.
+ * Operations on a cage, equal to those of the server, so that lines move before the server's answer. Angles are in
+ * degrees, intrinsic XYZ; rotation, scaling and shear are about the cage's pivot.
  */
 import { Euler, MathUtils, Matrix3, Matrix4, Quaternion, Vector3 } from "three";
-import { axesOf, orientation } from "./cage";
+import { edgeDirections, nearestRotation } from "./cage";
 import type { Corners, DragMove, Vec3 } from "../net/protocol";
 
 export type Operation = DragMove["operation"];
@@ -14,44 +14,55 @@ export interface Posed {
   pivot: Vec3;
 }
 
-/** The cage after the operation; the pivot travels with a translation and stays with all else. */
+/** The cage after the operation; only a translation moves the pivot. */
 export function apply(operation: Operation, { corners, pivot }: Posed): Posed {
   switch (operation.kind) {
     case "translate":
       return {
-        corners: moved(corners, [0, 1, 2, 3, 4, 5, 6, 7], operation.by),
-        pivot: sum(pivot, operation.by),
+        corners: moveCorners(corners, [0, 1, 2, 3, 4, 5, 6, 7], operation.by),
+        pivot: addVectors(pivot, operation.by),
       };
     case "move_corners":
-      return { corners: moved(corners, operation.corners, operation.by), pivot };
+      return { corners: moveCorners(corners, operation.corners, operation.by), pivot };
     case "rotate":
       return {
-        corners: linear(corners, pivot, rotationMatrix(operation.rotation_deg, operation.axes, corners)),
+        corners: transformAboutPivot(
+          corners,
+          pivot,
+          rotationMatrix(operation.rotation_deg, operation.axes, corners),
+        ),
         pivot,
       };
     case "scale":
       return {
-        corners: linear(corners, pivot, along(diagonal(operation.by), operation.axes, corners)),
+        corners: transformAboutPivot(
+          corners,
+          pivot,
+          inWorldAxes(diagonal(operation.by), operation.axes, corners),
+        ),
         pivot,
       };
     case "shear": {
       const { xy = 0, xz = 0, yx = 0, yz = 0, zx = 0, zy = 0 } = operation;
       const shear = new Matrix3().set(1, xy, xz, yx, 1, yz, zx, zy, 1);
-      return { corners: linear(corners, pivot, along(shear, operation.axes, corners)), pivot };
+      return {
+        corners: transformAboutPivot(corners, pivot, inWorldAxes(shear, operation.axes, corners)),
+        pivot,
+      };
     }
   }
 }
 
-/** The share t of an operation: lengths and shears times t, the angle times t, factors to the power t. */
-export function part(operation: Operation, t: number): Operation {
+/** The share t of an operation: lengths, shears and the angle times t, factors to the power t. */
+export function scaleOperation(operation: Operation, t: number): Operation {
   switch (operation.kind) {
     case "translate":
     case "move_corners":
-      return { ...operation, by: scaled(operation.by, t) };
+      return { ...operation, by: scaleVector(operation.by, t) };
     case "rotate": {
-      const full = quaternion(operation.rotation_deg);
+      const full = quaternionFromDegrees(operation.rotation_deg);
       if (full.w < 0) full.set(-full.x, -full.y, -full.z, -full.w);
-      return { ...operation, rotation_deg: degrees(new Quaternion().slerp(full, t)) };
+      return { ...operation, rotation_deg: degreesFromQuaternion(new Quaternion().slerp(full, t)) };
     }
     case "scale":
       return { ...operation, by: operation.by.map((s) => s ** t) as Vec3 };
@@ -62,14 +73,14 @@ export function part(operation: Operation, t: number): Operation {
   }
 }
 
-/** How much an operation is: its length, angle in degrees, largest logarithm of a factor, or shear. */
-export function amount(operation: Operation): number {
+/** Magnitude of an operation: length, angle in degrees, largest logarithm of a factor, or norm of the shears. */
+export function operationSize(operation: Operation): number {
   switch (operation.kind) {
     case "translate":
     case "move_corners":
       return Math.hypot(...operation.by);
     case "rotate":
-      return MathUtils.radToDeg(quaternion(operation.rotation_deg).angleTo(new Quaternion()));
+      return MathUtils.radToDeg(quaternionFromDegrees(operation.rotation_deg).angleTo(new Quaternion()));
     case "scale":
       return Math.max(...operation.by.map((s) => Math.abs(Math.log(s))));
     case "shear": {
@@ -79,16 +90,17 @@ export function amount(operation: Operation): number {
   }
 }
 
-/** Steps that a drag snaps to: world units, degrees, share of a scale factor. */
-export interface Steps {
+/** Steps of a snapped drag: length in world units, angle in degrees, and scale factor. */
+export interface SnapSteps {
   length: number;
   angle: number;
   factor: number;
 }
 
-/** The operation with its numbers rounded to whole steps. */
-export function snapped(operation: Operation, steps: Steps): Operation {
-  const to = (v: Vec3, step: number): Vec3 => v.map((x) => tidy(Math.round(x / step) * step)) as Vec3;
+/** The operation with its numbers rounded to multiples of the steps. */
+export function snapOperation(operation: Operation, steps: SnapSteps): Operation {
+  const to = (v: Vec3, step: number): Vec3 =>
+    v.map((x) => roundDecimals(Math.round(x / step) * step)) as Vec3;
   switch (operation.kind) {
     case "translate":
     case "move_corners":
@@ -105,22 +117,23 @@ export function snapped(operation: Operation, steps: Steps): Operation {
   }
 }
 
-/** A power of ten, or five of it, of about a tenth of the length or less: the step of translations. */
-export function lengthStep(length: number): number {
+/** Step of translations for a cage of a length: 1 or 5 times a power of ten, at most a tenth of the length. */
+export function snapLength(length: number): number {
   const raw = Math.max(length, 1e-9) / 10;
   const decade = 10 ** Math.floor(Math.log10(raw));
-  return tidy(raw / decade >= 5 ? 5 * decade : decade);
+  return roundDecimals(raw / decade >= 5 ? 5 * decade : decade);
 }
 
-/** The operation in words, for the readout beside the mouse. */
-export function described(operation: Operation): string {
-  const three = (v: Vec3, digits: number): string => v.map((x) => tidy(x, digits).toFixed(digits)).join("  ");
+/** Text of the operation's numbers, for the readout beside the mouse. */
+export function describeOperation(operation: Operation): string {
+  const three = (v: Vec3, digits: number): string =>
+    v.map((x) => roundDecimals(x, digits).toFixed(digits)).join("  ");
   switch (operation.kind) {
     case "translate":
     case "move_corners":
       return three(operation.by, 3);
     case "rotate":
-      return `${operation.rotation_deg.map((x) => tidy(x, 1).toFixed(1)).join("°  ")}°`;
+      return `${operation.rotation_deg.map((x) => roundDecimals(x, 1).toFixed(1)).join("°  ")}°`;
     case "scale":
       return `× ${three(operation.by, 2)}`;
     case "shear":
@@ -129,36 +142,36 @@ export function described(operation: Operation): string {
 }
 
 /** The quaternion of intrinsic XYZ angles in degrees. */
-export function quaternion(rotation_deg: Vec3): Quaternion {
+export function quaternionFromDegrees(rotation_deg: Vec3): Quaternion {
   const [x, y, z] = rotation_deg.map((angle) => MathUtils.degToRad(angle));
   return new Quaternion().setFromEuler(new Euler(x, y, z, "XYZ"));
 }
 
 /** Intrinsic XYZ angles in degrees. */
-export function degrees(q: Quaternion): Vec3 {
+export function degreesFromQuaternion(q: Quaternion): Vec3 {
   const { x, y, z } = new Euler().setFromQuaternion(q, "XYZ");
-  return [x, y, z].map((angle) => tidy(MathUtils.radToDeg(angle))) as Vec3;
+  return [x, y, z].map((angle) => roundDecimals(MathUtils.radToDeg(angle))) as Vec3;
 }
 
-/** x without the rounding of its last digits; no negative zero. */
-export function tidy(x: number, digits = 9): number {
+/** The number rounded to some decimals, without negative zero. */
+export function roundDecimals(x: number, digits = 9): number {
   const rounded = Number(x.toFixed(digits));
   return rounded === 0 ? 0 : rounded;
 }
 
 function rotationMatrix(rotation_deg: Vec3, axes: Axes | undefined, corners: Corners): Matrix3 {
-  const turn = quaternion(rotation_deg);
+  const turn = quaternionFromDegrees(rotation_deg);
   if (axes === "cage") {
-    const own = orientation(corners);
+    const own = nearestRotation(corners);
     turn.premultiply(own).multiply(own.clone().invert());
   }
   return new Matrix3().setFromMatrix4(new Matrix4().makeRotationFromQuaternion(turn));
 }
 
-/** A matrix that is given along the cage's own edges, in world axes. */
-function along(matrix: Matrix3, axes: Axes | undefined, corners: Corners): Matrix3 {
+/** A matrix in world axes, given along `axes`: the world's, or the edges of the cage. */
+function inWorldAxes(matrix: Matrix3, axes: Axes | undefined, corners: Corners): Matrix3 {
   if (axes !== "cage") return matrix;
-  const own = axesOf(corners);
+  const own = edgeDirections(corners);
   return own.clone().multiply(matrix).multiply(own.clone().invert());
 }
 
@@ -166,21 +179,21 @@ function diagonal([x, y, z]: Vec3): Matrix3 {
   return new Matrix3().set(x, 0, 0, 0, y, 0, 0, 0, z);
 }
 
-function linear(corners: Corners, pivot: Vec3, matrix: Matrix3): Corners {
+function transformAboutPivot(corners: Corners, pivot: Vec3, matrix: Matrix3): Corners {
   const centre = new Vector3(...pivot);
   return corners.map((c) =>
     new Vector3(...c).sub(centre).applyMatrix3(matrix).add(centre).toArray(),
   ) as Corners;
 }
 
-function moved(corners: Corners, which: readonly number[], by: Vec3): Corners {
-  return corners.map((corner, k) => (which.includes(k) ? sum(corner, by) : corner)) as Corners;
+function moveCorners(corners: Corners, which: readonly number[], by: Vec3): Corners {
+  return corners.map((corner, k) => (which.includes(k) ? addVectors(corner, by) : corner)) as Corners;
 }
 
-function sum(a: Vec3, b: Vec3): Vec3 {
+function addVectors(a: Vec3, b: Vec3): Vec3 {
   return [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 }
 
-function scaled(a: Vec3, t: number): Vec3 {
+function scaleVector(a: Vec3, t: number): Vec3 {
   return [a[0] * t, a[1] * t, a[2] * t];
 }

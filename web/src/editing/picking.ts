@@ -1,69 +1,78 @@
-/** What is under the mouse, among the parts of the cages as they are on the screen. */
-import { EDGES, FACES, faceNormal, middle, type Part } from "./cage";
+/** Parts of cages under a pixel of the screen. */
+import { EDGES, FACES, faceNormal, centroid, type CagePart } from "./cage";
 import type { Corners, Vec3 } from "../net/protocol";
 
 export interface ScreenPoint {
   x: number;
   y: number;
-  /** Distance along the view; not above 0 behind the camera. */
+  /** Distance along the viewing direction; at most 0 behind the camera. */
   depth: number;
 }
 
 export type Project = (point: Vec3) => ScreenPoint;
 
-/** Pixels within which a corner's or a face's handle, or an edge, is meant. */
-const REACH = { corner: 9, face: 8, edge: 6 } as const;
+/** Distance in pixels within which a corner's or a face's handle, or an edge, is picked. */
+const PICK_RADIUS_PIXELS = { corner: 9, face: 8, edge: 6 } as const;
 
-export interface Candidate {
+export interface ViewedCage {
   corners: Corners;
   eye: Vec3;
 }
 
 /**
- * The part of a cage at pixel (x, y), or null: corners before faces before edges, and of several the one
- * nearest to the camera. Only faces that look towards the eye have a handle.
+ * The part of a cage at pixel (x, y), or null: corners take precedence over faces and faces over edges, and of several
+ * the one closest to the camera is picked. Only faces turned to the eye have a handle.
  */
-export function pick(x: number, y: number, { corners, eye }: Candidate, project: Project): Part | null {
+export function pickPart(
+  x: number,
+  y: number,
+  { corners, eye }: ViewedCage,
+  project: Project,
+): CagePart | null {
   const points = corners.map(project);
   return (
     pickCorner(x, y, corners, project) ??
-    nearest(
+    closestPart(
       "face",
-      facesTowards(corners, eye).map((p) => p && near(project(p), x, y, REACH.face)),
+      visibleFaceCenters(corners, eye).map(
+        (p) => p && depthWithin(project(p), x, y, PICK_RADIUS_PIXELS.face),
+      ),
     ) ??
-    nearest(
+    closestPart(
       "edge",
-      EDGES.map(([i, j]) => nearSegment(points[i], points[j], x, y)),
+      EDGES.map(([i, j]) => segmentDepthWithin(points[i], points[j], x, y)),
     )
   );
 }
 
 /** The corner of a cage at pixel (x, y), or null. */
-export function pickCorner(x: number, y: number, corners: Corners, project: Project): Part | null {
-  return nearest(
+export function pickCorner(x: number, y: number, corners: Corners, project: Project): CagePart | null {
+  return closestPart(
     "corner",
-    corners.map((corner) => near(project(corner), x, y, REACH.corner)),
+    corners.map((corner) => depthWithin(project(corner), x, y, PICK_RADIUS_PIXELS.corner)),
   );
 }
 
-/** The middle of each face that looks towards the eye, null for the others. */
-export function facesTowards(corners: Corners, eye: Vec3): (Vec3 | null)[] {
+/** Centers [3] of the faces turned to the eye; null for the other faces. */
+export function visibleFaceCenters(corners: Corners, eye: Vec3): (Vec3 | null)[] {
   return FACES.map((ids, face) => {
-    const centre = middle(corners, ids);
+    const centre = centroid(corners, ids);
     const normal = faceNormal(corners, face);
     const facing = normal.reduce((sum, n, i) => sum + n * (eye[i] - centre[i]), 0) > 0;
     return facing ? centre : null;
   });
 }
 
-/** Distance in pixels from (x, y) to a cage's nearest edge on the screen. */
+/** Distance in pixels from (x, y) to the closest edge of a cage on the screen. */
 export function distanceToEdges(x: number, y: number, corners: Corners, project: Project): number {
   const points = corners.map(project);
-  return Math.min(...EDGES.map(([i, j]) => segment(points[i], points[j], x, y)?.distance ?? Infinity));
+  return Math.min(
+    ...EDGES.map(([i, j]) => segmentDistance(points[i], points[j], x, y)?.distance ?? Infinity),
+  );
 }
 
-function nearest(kind: Part["kind"], depths: (number | null)[]): Part | null {
-  let best: Part | null = null;
+function closestPart(kind: CagePart["kind"], depths: (number | null)[]): CagePart | null {
+  let best: CagePart | null = null;
   let least = Infinity;
   depths.forEach((depth, index) => {
     if (depth !== null && depth < least) {
@@ -74,16 +83,16 @@ function nearest(kind: Part["kind"], depths: (number | null)[]): Part | null {
   return best;
 }
 
-function near(p: ScreenPoint, x: number, y: number, reach: number): number | null {
+function depthWithin(p: ScreenPoint, x: number, y: number, reach: number): number | null {
   return p.depth > 0 && Math.hypot(p.x - x, p.y - y) <= reach ? p.depth : null;
 }
 
-function nearSegment(a: ScreenPoint, b: ScreenPoint, x: number, y: number): number | null {
-  const found = segment(a, b, x, y);
-  return found !== null && found.distance <= REACH.edge ? found.depth : null;
+function segmentDepthWithin(a: ScreenPoint, b: ScreenPoint, x: number, y: number): number | null {
+  const found = segmentDistance(a, b, x, y);
+  return found !== null && found.distance <= PICK_RADIUS_PIXELS.edge ? found.depth : null;
 }
 
-function segment(
+function segmentDistance(
   a: ScreenPoint,
   b: ScreenPoint,
   x: number,

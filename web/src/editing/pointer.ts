@@ -1,53 +1,53 @@
-/** The mouse on the canvas: corners first, then the gizmo, then faces and edges, then the view. */
+/** Mouse input of the canvas; precedence: corners, gizmo, faces and edges, then the view. */
 import { Plane, Vector3 } from "three";
-import { cornersOf, extent, faceNormal, middle, type Part } from "./cage";
+import { partCorners, halfExtent, faceNormal, centroid, type CagePart } from "./cage";
 import type { App } from "../app/app";
-import { leading } from "./drag";
-import { cornersMove, onLine, onPlane } from "./gestures";
-import { lengthStep, snapped, type Operation } from "./operations";
-import { distanceToEdges, pick, pickCorner } from "./picking";
-import { draggable, shownCages } from "./cage_overlay";
-import { obstacle, selected, showsCages, target, type Hover } from "../app/store";
+import { targetCage } from "./drag";
+import { moveCornersBy, closestPointOnLine, intersectPlane } from "./gestures";
+import { snapLength, snapOperation, type Operation } from "./operations";
+import { distanceToEdges, pickPart, pickCorner } from "./picking";
+import { draggableCages, shownCages } from "./cage_overlay";
+import { dragObstacle, selectedEdit, showsCages, dragTarget, type Hover } from "../app/store";
 
-const SNAP_ANGLE = 15;
+const SNAP_ANGLE_DEG = 15;
 const SNAP_FACTOR = 0.1;
-const CLICK_REACH = 4;
-const LINE_REACH = 7;
-const DOUBLE_CLICK = 500;
-/** The gizmo's handle for turning freely: it fills the gizmo, and gives way to what is inside. */
-const WHOLE_BALL = "XYZE";
+const MAX_CLICK_PIXELS = 4;
+const LINE_RADIUS_PIXELS = 7;
+const DOUBLE_CLICK_MS = 500;
+/** The gizmo's handle of free rotation, which fills the gizmo: parts of cages inside take precedence. */
+const FREE_ROTATION = "XYZE";
 
 type Constraint = "X" | "Y" | "Z" | null;
 
-/** What the mouse has hold of: the gizmo, or corners that follow it in a plane or along a line. */
+/** The object of a drag: the gizmo, or corners that follow the mouse in a plane or along a line. */
 type Hold =
   | { kind: "gizmo"; corners: number[] }
   | { kind: "part"; corners: number[]; at: Vector3; grabbed: Vector3; plane: Plane; line: Vector3 | null };
 
 export class Pointer {
-  /** Where the mouse is on the canvas, CSS pixels. */
-  at = { x: 0, y: 0 };
+  /** Position of the mouse on the canvas, CSS pixels. */
+  position = { x: 0, y: 0 };
   /** Whether the snapping key is held. */
   snapKey = false;
-  /** Axis along which a drag of corners is kept. */
+  /** World axis to which a drag of corners is constrained. */
   private constraint: Constraint = null;
   private hold: Hold | null = null;
-  /** Where the mouse was when the drag last followed it. */
-  private followed = { x: NaN, y: NaN };
+  /** Position of the mouse that the drag has applied last. */
+  private appliedAt = { x: NaN, y: NaN };
   private pressed: { x: number; y: number } | null = null;
-  private latest = { x: 0, y: 0, time: 0 };
-  /** The first press of what may become a double click: when, and whether nothing was under it. */
-  private first = { time: -Infinity, free: true };
+  private latestEvent = { x: 0, y: 0, time: 0 };
+  /** Time of the first press of a possible double click, and whether no part was under the mouse. */
+  private firstPress = { time: -Infinity, release: true };
 
   constructor(private readonly app: App) {
     const { canvas } = app.viewport;
     canvas.addEventListener("pointerdown", (event) => this.down(event), { capture: true });
     canvas.addEventListener("pointermove", (event) => this.move(event));
-    // Where the mouse is between two frames; not all browsers and addresses tell.
+    // Positions between two frames, which not all browsers report.
     canvas.addEventListener("pointerrawupdate", (event) => {
-      if (this.hold !== null) this.locate(event as PointerEvent);
+      if (this.hold !== null) this.readPosition(event as PointerEvent);
     });
-    app.frames.beforeRequest.push(() => this.catchUp());
+    app.frames.beforeRequest.push(() => this.applyNewMotion());
     canvas.addEventListener("pointerup", (event) => this.up(event));
     canvas.addEventListener("pointercancel", () => this.cancel());
     canvas.addEventListener("pointerleave", () => this.leave());
@@ -59,44 +59,45 @@ export class Pointer {
     return this.hold !== null;
   }
 
-  /** Gives the drag up that goes on; false where none does. */
+  /** Cancels the drag; returns false without a drag. */
   cancel(): boolean {
     if (this.hold === null) return false;
-    if (this.hold.kind === "gizmo") this.app.gizmo.end(this.app.viewport.device(this.at.x, this.at.y));
+    if (this.hold.kind === "gizmo")
+      this.app.gizmo.end(this.app.viewport.device(this.position.x, this.position.y));
     this.hold = null;
     this.app.cancelDrag();
     this.free();
     return true;
   }
 
-  /** Keeps a drag of corners along an axis of the world, or lets it go again. */
+  /** Constrains a drag of corners to a world axis, or releases the same constraint; false without such a drag. */
   constrain(axis: "X" | "Y" | "Z"): boolean {
     if (this.hold?.kind !== "part") return false;
     this.constraint = this.constraint === axis ? null : axis;
-    this.follow();
+    this.applyMotion();
     return true;
   }
 
-  /** Follows the mouse again where it is: after a snapping key, say. */
-  follow(): void {
+  /** Applies the mouse's position to the drag again, after a change of snapping or constraint. */
+  applyMotion(): void {
     if (this.hold === null) return;
     const raw = this.operation(this.hold);
-    this.followed = { ...this.at };
-    if (raw !== null) this.app.moveDrag(this.snap(raw), this.latest.time);
+    this.appliedAt = { ...this.position };
+    if (raw !== null) this.app.moveDrag(this.snap(raw), this.latestEvent.time);
   }
 
-  /** Follows the mouse if it has moved since. */
-  private catchUp(): void {
-    if (this.at.x !== this.followed.x || this.at.y !== this.followed.y) this.follow();
+  /** Applies the mouse's position if it has changed. */
+  private applyNewMotion(): void {
+    if (this.position.x !== this.appliedAt.x || this.position.y !== this.appliedAt.y) this.applyMotion();
   }
 
   private down(event: PointerEvent): void {
-    this.locate(event);
-    this.pressed = { ...this.at };
+    this.readPosition(event);
+    this.pressed = { ...this.position };
     const free = event.button !== 0 || event.altKey;
-    const hover = free ? null : this.under();
-    if (event.timeStamp - this.first.time > DOUBLE_CLICK) {
-      this.first = { time: event.timeStamp, free: hover === null && this.app.gizmo.axis === null };
+    const hover = free ? null : this.partUnderPointer();
+    if (event.timeStamp - this.firstPress.time > DOUBLE_CLICK_MS) {
+      this.firstPress = { time: event.timeStamp, release: hover === null && this.app.gizmo.axis === null };
     }
     if (free || (hover === null && this.app.gizmo.axis === null)) {
       this.app.camera.held = true;
@@ -105,26 +106,27 @@ export class Pointer {
     event.stopImmediatePropagation();
     if (this.app.viewport.orbit) this.app.viewport.orbit.enabled = false;
     this.app.viewport.canvas.setPointerCapture(event.pointerId);
-    if (hover !== null && event.shiftKey) this.choose(hover.part);
+    if (hover !== null && event.shiftKey) this.toggleCorners(hover.part);
     else if (hover !== null) this.grab(hover);
     else this.grabGizmo();
     if (this.hold === null) this.free();
   }
 
   private move(event: PointerEvent): void {
-    this.locate(event);
-    if (this.hold !== null) this.catchUp();
+    this.readPosition(event);
+    if (this.hold !== null) this.applyNewMotion();
     else if (event.buttons === 0) this.updateHover();
   }
 
   private up(event: PointerEvent): void {
-    this.locate(event);
+    this.readPosition(event);
     this.app.camera.held = false;
     if (this.hold !== null) {
-      if (this.hold.kind === "gizmo") this.app.gizmo.end(this.app.viewport.device(this.at.x, this.at.y));
+      if (this.hold.kind === "gizmo")
+        this.app.gizmo.end(this.app.viewport.device(this.position.x, this.position.y));
       this.hold = null;
       this.app.endDrag();
-    } else if (this.pressed && event.button === 0 && this.travelled() < CLICK_REACH) {
+    } else if (this.pressed && event.button === 0 && this.travelPixels() < MAX_CLICK_PIXELS) {
       this.select();
     }
     this.free();
@@ -133,7 +135,7 @@ export class Pointer {
 
   private leave(): void {
     if (this.hold !== null) return;
-    this.app.gizmo.leave();
+    this.app.gizmo.clearHover();
     this.app.store.set({ hover: null });
     this.app.viewport.invalidate();
   }
@@ -144,10 +146,10 @@ export class Pointer {
     if (this.app.viewport.orbit) this.app.viewport.orbit.enabled = true;
   }
 
-  /** Shows what a click would take hold of. */
+  /** Highlights the part under the mouse. */
   private updateHover(): void {
     const axis = this.app.gizmo.axis;
-    const hover = this.under();
+    const hover = this.partUnderPointer();
     if (this.app.gizmo.axis !== axis) this.app.viewport.invalidate();
     const before = this.app.store.now.hover;
     if (!(
@@ -160,35 +162,35 @@ export class Pointer {
     this.app.viewport.canvas.style.cursor = hover || this.app.gizmo.axis !== null ? "pointer" : "";
   }
 
-  /** The part of a cage that a click would take hold of; where it is the gizmo's handle instead, that is lit. */
-  private under(): Hover | null {
+  /** The part of a cage under the mouse; null for none, or where the gizmo takes precedence and is highlighted. */
+  private partUnderPointer(): Hover | null {
     const { now } = this.app.store;
-    const edit = selected(now);
-    this.app.gizmo.leave();
-    if (edit === null || !showsCages(now) || obstacle(now, edit) !== null) return null;
+    const edit = selectedEdit(now);
+    this.app.gizmo.clearHover();
+    if (edit === null || !showsCages(now) || dragObstacle(now, edit) !== null) return null;
     const { project } = this.app.viewport;
-    const { x, y } = this.at;
-    const cages = draggable(now, shownCages(edit, this.app.drag));
+    const { x, y } = this.position;
+    const cages = draggableCages(now, shownCages(edit, this.app.drag));
     for (const { cage, corners } of cages) {
       const corner = pickCorner(x, y, corners, project);
       if (corner !== null) return { part: corner, cage };
     }
     const axis = this.app.gizmo.hover(this.app.viewport.device(x, y));
-    if (axis !== null && axis !== WHOLE_BALL) return null;
+    if (axis !== null && axis !== FREE_ROTATION) return null;
     const eye = this.app.viewport.camera.position.toArray();
     for (const { cage, corners } of cages) {
-      const part = pick(x, y, { corners, eye }, project);
+      const part = pickPart(x, y, { corners, eye }, project);
       if (part === null) continue;
-      this.app.gizmo.leave();
+      this.app.gizmo.clearHover();
       return { part, cage };
     }
     return null;
   }
 
-  /** Adds the corners of a part to those that are dragged together, or takes them out again. */
-  private choose(part: Part): void {
+  /** Adds the corners of a part to the corners that are dragged together, or removes them. */
+  private toggleCorners(part: CagePart): void {
     const chosen = this.app.store.now.corners;
-    const own = cornersOf(part);
+    const own = partCorners(part);
     const corners = own.every((k) => chosen.includes(k))
       ? chosen.filter((k) => !own.includes(k))
       : [...new Set([...chosen, ...own])].sort((a, b) => a - b);
@@ -197,52 +199,52 @@ export class Pointer {
 
   private grab(hover: Hover): void {
     const { now } = this.app.store;
-    const own = cornersOf(hover.part);
+    const own = partCorners(hover.part);
     const together = own.every((k) => now.corners.includes(k)) && now.corners.length > own.length;
     const corners = together ? now.corners : own;
     const drag = this.app.beginDrag(now.mode === "edit" ? "field" : hover.cage);
     if (drag === null) return;
     if (!together && now.corners.length > 0) this.app.store.set({ corners: [] });
-    const cage = leading(drag.start, drag.target).corners;
-    const at = new Vector3(...middle(cage, own));
+    const cage = targetCage(drag.start, drag.target).corners;
+    const at = new Vector3(...centroid(cage, own));
     const line =
       hover.part.kind === "face" && !together ? new Vector3(...faceNormal(cage, hover.part.index)) : null;
     const plane = new Plane().setFromNormalAndCoplanarPoint(this.app.viewport.forward, at);
     this.hold = { kind: "part", corners, at, grabbed: at, plane, line };
-    this.hold.grabbed = this.reached(this.hold) ?? at;
+    this.hold.grabbed = this.targetPosition(this.hold) ?? at;
   }
 
   private grabGizmo(): void {
     const { corners } = this.app.store.now;
     if (this.app.beginDrag() === null) return;
-    this.app.gizmo.begin(this.app.viewport.device(this.at.x, this.at.y));
+    this.app.gizmo.begin(this.app.viewport.device(this.position.x, this.position.y));
     this.hold = { kind: "gizmo", corners: [...corners] };
   }
 
   private operation(hold: Hold): Operation | null {
     if (hold.kind === "gizmo") {
-      return this.app.gizmo.move(this.app.viewport.device(this.at.x, this.at.y), hold.corners);
+      return this.app.gizmo.move(this.app.viewport.device(this.position.x, this.position.y), hold.corners);
     }
-    const to = this.reached(hold);
+    const to = this.targetPosition(hold);
     if (to === null) return null;
-    return cornersMove(hold.corners, to.clone().sub(this.constraint === null ? hold.grabbed : hold.at));
+    return moveCornersBy(hold.corners, to.clone().sub(this.constraint === null ? hold.grabbed : hold.at));
   }
 
-  /** Where the mouse has taken what it holds. */
-  private reached(hold: Hold & { kind: "part" }): Vector3 | null {
-    const ray = this.app.viewport.ray(this.at.x, this.at.y);
+  /** The world position to which the mouse moves the dragged part; null where its ray gives none. */
+  private targetPosition(hold: Hold & { kind: "part" }): Vector3 | null {
+    const ray = this.app.viewport.ray(this.position.x, this.position.y);
     const axes = { X: new Vector3(1, 0, 0), Y: new Vector3(0, 1, 0), Z: new Vector3(0, 0, 1) };
-    if (this.constraint !== null) return onLine(ray, hold.at, axes[this.constraint]);
-    if (hold.line !== null) return onLine(ray, hold.at, hold.line);
-    return onPlane(ray, hold.at, hold.plane.normal);
+    if (this.constraint !== null) return closestPointOnLine(ray, hold.at, axes[this.constraint]);
+    if (hold.line !== null) return closestPointOnLine(ray, hold.at, hold.line);
+    return intersectPlane(ray, hold.at, hold.plane.normal);
   }
 
   private snap(operation: Operation): Operation {
     const { now } = this.app.store;
-    const edit = selected(now);
+    const edit = selectedEdit(now);
     if (now.snap === this.snapKey || edit === null) return operation;
-    const step = lengthStep(2 * extent(edit.inner));
-    return snapped(operation, { length: step, angle: SNAP_ANGLE, factor: SNAP_FACTOR });
+    const step = snapLength(2 * halfExtent(edit.inner));
+    return snapOperation(operation, { length: step, angle: SNAP_ANGLE_DEG, factor: SNAP_FACTOR });
   }
 
   /** Selects the edit whose cage was clicked. */
@@ -252,13 +254,13 @@ export class Pointer {
       .filter((edit) => edit.enabled)
       .map((edit) => {
         const cages = shownCages(edit, this.app.drag);
-        const corners = leading(cages, target(now)).corners;
+        const corners = targetCage(cages, dragTarget(now)).corners;
         return {
           id: edit.id,
-          distance: distanceToEdges(this.at.x, this.at.y, corners, this.app.viewport.project),
+          distance: distanceToEdges(this.position.x, this.position.y, corners, this.app.viewport.project),
         };
       })
-      .filter(({ distance }) => distance < LINE_REACH)
+      .filter(({ distance }) => distance < LINE_RADIUS_PIXELS)
       .sort((a, b) => a.distance - b.distance);
     if (reach.length > 0 && !reach.some(({ id }) => id === now.state?.selected)) {
       this.app.send({ type: "command", name: "select", edit: reach[0].id });
@@ -266,22 +268,22 @@ export class Pointer {
   }
 
   private place(event: MouseEvent): void {
-    this.locate(event);
-    if (!this.first.free) return;
+    this.readPosition(event);
+    if (!this.firstPress.release) return;
     const { width, height } = this.app.viewport.points;
     this.app.expectEdit();
-    this.app.send({ type: "place", x: clamp(this.at.x / width), y: clamp(this.at.y / height) });
+    this.app.send({ type: "place", x: clamp(this.position.x / width), y: clamp(this.position.y / height) });
   }
 
-  private travelled(): number {
-    return this.pressed ? Math.hypot(this.at.x - this.pressed.x, this.at.y - this.pressed.y) : 0;
+  private travelPixels(): number {
+    return this.pressed ? Math.hypot(this.position.x - this.pressed.x, this.position.y - this.pressed.y) : 0;
   }
 
-  private locate(event: MouseEvent): void {
+  private readPosition(event: MouseEvent): void {
     const box = this.app.viewport.canvas.getBoundingClientRect();
-    this.at = { x: event.clientX - box.left, y: event.clientY - box.top };
+    this.position = { x: event.clientX - box.left, y: event.clientY - box.top };
     this.snapKey = event.ctrlKey;
-    this.latest = { ...this.at, time: event.timeStamp };
+    this.latestEvent = { ...this.position, time: event.timeStamp };
   }
 }
 

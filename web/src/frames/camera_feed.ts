@@ -1,62 +1,62 @@
-/** Tells the server where the page looks from, once a frame, and remembers it for the pictures that answer. */
+/** Camera messages to the server, at most one per frame, and the viewpoints of the images that answer them. */
 import type { PageMessage } from "../net/protocol";
 import type { Viewpoint } from "./pictures";
 import type { Viewport } from "./viewport";
 
-const REST_AFTER = 140;
-const REMEMBERED = 200;
+const REST_MS = 140;
+const MAX_VIEWPOINTS = 200;
 
 export class CameraFeed {
   seq = 0;
   private readonly viewpoints = new Map<number, Viewpoint>();
   private changed = false;
   private moving = false;
-  private rest: ReturnType<typeof setTimeout> | undefined;
-  /** Whether a button is held that turns the view: then it does not rest. */
+  private restTimer: ReturnType<typeof setTimeout> | undefined;
+  /** Whether a button that turns the view is held: the camera then does not count as resting. */
   held = false;
-  /** Whether the page draws the moving view, so that the server need not know of it before it rests. */
+  /** Whether the page draws moving frames, so that the server needs the camera only once it rests. */
   drawnHere: () => boolean = () => false;
 
   constructor(
     private readonly viewport: Viewport,
     private readonly send: (message: PageMessage) => boolean,
   ) {
-    viewport.cameraChanged.push(() => {
+    viewport.cameraChanges.push(() => {
       this.changed = true;
       this.moving = true;
       this.waitForRest();
     });
     viewport.beforeFrame.push(() => {
-      if (this.changed && !(this.moving && this.drawnHere())) this.tell();
+      if (this.changed && !(this.moving && this.drawnHere())) this.sendCamera();
     });
   }
 
-  /** Whether the server knows the camera, and that it rests. */
+  /** Whether the server knows the camera, and that the camera rests. */
   get resting(): boolean {
     return !this.changed && !this.moving;
   }
 
-  /** Sends the camera as it is, at rest: after connecting, say. */
+  /** Sends the current camera as resting, for example after a connection. */
   restate(): void {
     this.moving = false;
-    this.tell();
+    this.sendCamera();
     this.viewport.invalidate();
   }
 
-  /** Where the picture of a camera message was taken from. */
+  /** The viewpoint of the image that answers a camera message. */
   viewpoint(seq: number): Viewpoint | null {
     return this.viewpoints.get(seq) ?? null;
   }
 
   private waitForRest(): void {
-    clearTimeout(this.rest);
-    this.rest = setTimeout(() => {
+    clearTimeout(this.restTimer);
+    this.restTimer = setTimeout(() => {
       if (this.held) this.waitForRest();
       else this.restate();
-    }, REST_AFTER);
+    }, REST_MS);
   }
 
-  private tell(): void {
+  private sendCamera(): void {
     this.changed = false;
     const { viewport } = this;
     const seq = ++this.seq;
@@ -64,7 +64,7 @@ export class CameraFeed {
       viewProjection: viewport.viewProjection,
       eye: viewport.camera.position.clone(),
     });
-    this.viewpoints.delete(seq - REMEMBERED);
+    this.viewpoints.delete(seq - MAX_VIEWPOINTS);
     const { width, height } = viewport.pixels;
     this.send({
       type: "camera",

@@ -1,18 +1,18 @@
-/** The distances of a whole picture, put together from the parts that arrive. */
+/** Distances of an image, assembled from the parts that arrive. */
 import type { PictureHeader } from "../net/protocol";
 
-/** Stands for "nothing there": further than any scene, and finite, since shaders interpolate badly with infinity. */
-export const NOTHING = 1e9;
-const NONE = 65535;
+/** Distance of a ray that hits nothing: beyond any scene, and finite, because shaders interpolate infinity badly. */
+export const EMPTY_DISTANCE = 1e9;
+const EMPTY_CODE = 65535;
 
 export class DepthImage {
   width = 1;
   height = 1;
   /** Distance along the ray, world units, row by row from the top. */
-  data = new Float32Array([NOTHING]);
+  data = new Float32Array([EMPTY_DISTANCE]);
 
-  /** Takes a part over. Where a part has another resolution than the whole, the whole is resampled first. */
-  put(header: PictureHeader, depth: Uint16Array): void {
+  /** Adds a part; the whole image is resampled first if the part has another resolution. */
+  addPart(header: PictureHeader, depth: Uint16Array): void {
     if (header.depth_width === 0 || header.depth_height === 0) return;
     const width = Math.max(1, Math.round((header.full_width * header.depth_width) / header.width));
     const height = Math.max(1, Math.round((header.full_height * header.depth_height) / header.height));
@@ -22,24 +22,25 @@ export class DepthImage {
     for (let j = 0; j < header.depth_height && top + j < height; j++) {
       for (let i = 0; i < header.depth_width && left + i < width; i++) {
         const value = depth[j * header.depth_width + i];
-        this.data[(top + j) * width + left + i] = value === NONE ? NOTHING : value * header.depth_scale;
+        this.data[(top + j) * width + left + i] =
+          value === EMPTY_CODE ? EMPTY_DISTANCE : value * header.depth_scale;
       }
     }
   }
 
-  /** Takes a whole picture's distances over, infinite where there is nothing. */
-  take(width: number, height: number, depth: Float32Array): void {
+  /** Replaces all distances; infinite ones hit nothing. */
+  replace(width: number, height: number, depth: Float32Array): void {
     this.width = width;
     this.height = height;
-    this.data = depth.map((distance) => (distance < NOTHING ? distance : NOTHING));
+    this.data = depth.map((distance) => (distance < EMPTY_DISTANCE ? distance : EMPTY_DISTANCE));
   }
 
-  /** The distance at (u, v) in [0,1], from the left and the top; null where there is nothing. */
+  /** The distance at (u, v) in [0,1], from the left and the top; null where the ray hits nothing. */
   at(u: number, v: number): number | null {
     const i = Math.min(this.width - 1, Math.max(0, Math.floor(u * this.width)));
     const j = Math.min(this.height - 1, Math.max(0, Math.floor(v * this.height)));
     const distance = this.data[j * this.width + i];
-    return distance < NOTHING ? distance : null;
+    return distance < EMPTY_DISTANCE ? distance : null;
   }
 
   private resample(width: number, height: number): void {

@@ -29,7 +29,7 @@ export interface PacerHost {
   readonly store: Store;
   readonly viewport: {
     /** Called after the orbit's center was guessed. */
-    guessed: (() => void)[];
+    orbitGuessed: (() => void)[];
     afterFrame: ((time: number) => void)[];
     readonly frameTime: number;
     readonly camera: { readonly position: Pick<Vector3, "toArray"> };
@@ -68,7 +68,7 @@ export class FramePacer {
   constructor(private readonly host: PacerHost) {
     const { viewport, store } = host;
     this.figures = new Throttle<Figures>(FIGURES_INTERVAL_MS, (figures) => store.set({ figures }));
-    viewport.guessed.push(() => this.awaitOrbitCenter());
+    viewport.orbitGuessed.push(() => this.awaitOrbitCenter());
     viewport.afterFrame.push((time) => this.finishFrame(time));
   }
 
@@ -160,7 +160,7 @@ export class FramePacer {
   }
 
   private finishFrame(time: number): void {
-    this.latency.framed(time);
+    this.latency.finishLines(time);
     const { drawn } = this;
     this.drawn = [];
     for (const frame of drawn) this.record(frame);
@@ -172,9 +172,9 @@ export class FramePacer {
     const { drag, seq, camera, revision, width, full_width, full_height, final } = header;
     const { render_ms: renderMs, encode_ms: encodeMs } = header;
     const presented = { time, drag, seq, camera, revision, width, fullWidth: full_width, final };
-    this.latency.shown(presented, received, decoded, renderMs, encodeMs);
+    this.latency.addPresented(presented, received, decoded, renderMs, encodeMs);
     const figures: Figures = {
-      perSecond: this.latency.perSecond(time),
+      perSecond: this.latency.frameRate(time),
       renderMs,
       encodeMs,
       width: full_width,

@@ -1,12 +1,12 @@
-/** How long it takes from the mouse's move to what shows it, by the page's own clock. */
+/** Latency from a motion of the mouse to the frame that shows it, in ms of the page's clock. */
 export interface Move {
   drag: number;
   seq: number;
-  /** When the mouse moved: the event's time. */
+  /** Time of the mouse event. */
   moved: number;
-  /** When the frame with the moved lines could be on the screen. */
+  /** Time at which the moved lines are on the screen. */
   lines: number | null;
-  /** When the picture came, was decoded, and could be on the screen. */
+  /** Times at which the image arrived, was decoded, and is on the screen. */
   received: number | null;
   decoded: number | null;
   presented: number | null;
@@ -26,14 +26,14 @@ export interface Presented {
   final: boolean;
 }
 
-const REMEMBERED = 2000;
+const MAX_RECORDS = 2000;
 
 export class Latency {
   readonly moves: Move[] = [];
   readonly presented: Presented[] = [];
 
-  /** The mouse has moved and the drag with it. */
-  moved(drag: number, seq: number, time: number): void {
+  /** Records a motion of the mouse in a drag. */
+  addMove(drag: number, seq: number, time: number): void {
     this.moves.push({
       drag,
       seq,
@@ -46,19 +46,25 @@ export class Latency {
       encodeMs: 0,
       width: 0,
     });
-    if (this.moves.length > REMEMBERED) this.moves.shift();
+    if (this.moves.length > MAX_RECORDS) this.moves.shift();
   }
 
-  /** A frame is on the screen: it shows the lines of all moves so far. */
-  framed(time: number): void {
+  /** Records that a redraw is on the screen, with the lines of all motions so far. */
+  finishLines(time: number): void {
     for (let i = this.moves.length - 1; i >= 0 && this.moves[i].lines === null; i--)
       this.moves[i].lines = time;
   }
 
-  /** A picture is on the screen; the moves up to the one that it shows are done with. */
-  shown(picture: Presented, received: number, decoded: number, renderMs: number, encodeMs: number): void {
+  /** Records an image on the screen, for the motion that it shows. */
+  addPresented(
+    picture: Presented,
+    received: number,
+    decoded: number,
+    renderMs: number,
+    encodeMs: number,
+  ): void {
     this.presented.push(picture);
-    if (this.presented.length > REMEMBERED) this.presented.shift();
+    if (this.presented.length > MAX_RECORDS) this.presented.shift();
     if (picture.drag === 0) return;
     const move = this.moves.find((m) => m.drag === picture.drag && m.seq === picture.seq);
     if (move?.presented !== null) return;
@@ -72,8 +78,8 @@ export class Latency {
     });
   }
 
-  /** Pictures a second, over the last two seconds. */
-  perSecond(now: number): number {
+  /** Images per second, over the last two seconds. */
+  frameRate(now: number): number {
     const recent = this.presented.filter((picture) => now - picture.time < 2000);
     if (recent.length < 2) return 0;
     return ((recent.length - 1) * 1000) / Math.max(1, recent[recent.length - 1].time - recent[0].time);

@@ -1,8 +1,8 @@
 /**
- * The field's picture behind everything else, and its distances for whoever asks what is hidden.
+ * The image of the field behind everything else, and its distances, for hidden lines.
  *
- * Parts are drawn into one texture as they arrive. While the camera is not where the picture was taken from,
- * the picture is a surface in space, seen from where the camera is now, until the next one comes.
+ * Parts are drawn into one texture as they arrive. Depth-based reprojection: while the camera differs from the image's
+ * viewpoint, the image is drawn as a surface in space from the current camera, until the next image arrives.
  */
 import {
   DataTexture,
@@ -22,18 +22,18 @@ import {
   Vector4,
   WebGLRenderTarget,
 } from "three";
-import { DepthImage, NOTHING } from "./depth_image";
+import { DepthImage, EMPTY_DISTANCE } from "./depth_image";
 import type { Distances } from "../field/views";
 import type { PictureHeader } from "../net/protocol";
 import type { Viewport } from "./viewport";
 
-/** A camera that a picture was taken from. */
+/** The camera of an image. */
 export interface Viewpoint {
   viewProjection: Matrix4;
   eye: Vector3;
 }
 
-const CELLS = 96;
+const SURFACE_CELLS = 96;
 
 const PART_VERTEX = `
 uniform vec4 part;
@@ -76,7 +76,7 @@ void main() { colour = vec4(texture(picture, at).rgb, 1.0); }`;
 export class Pictures {
   readonly depth = new DepthImage();
   readonly depthTexture = new DataTexture(this.depth.data, 1, 1, RedFormat, FloatType);
-  /** Where the picture that is shown was taken from. */
+  /** The camera of the image that is shown. */
   viewpoint: Viewpoint | null = null;
   private target: WebGLRenderTarget | null = null;
   private readonly flatCamera = new OrthographicCamera();
@@ -84,7 +84,7 @@ export class Pictures {
   private readonly partScene = new Scene();
   private readonly surface: Mesh<PlaneGeometry, ShaderMaterial>;
   private readonly quad = new PlaneGeometry(2, 2);
-  private readonly grid = new PlaneGeometry(2, 2, CELLS, CELLS);
+  private readonly grid = new PlaneGeometry(2, 2, SURFACE_CELLS, SURFACE_CELLS);
 
   constructor(private readonly viewport: Viewport) {
     this.depthTexture.magFilter = this.depthTexture.minFilter = NearestFilter;
@@ -120,22 +120,22 @@ export class Pictures {
     this.surface.renderOrder = -10;
     this.surface.visible = false;
     viewport.scene.add(this.surface);
-    viewport.beforeFrame.push(() => this.follow());
-    // What a lost context had cannot be freed in the one that comes after it.
+    viewport.beforeFrame.push(() => this.updateSurface());
+    // Objects of a lost context cannot be freed in the next context.
     viewport.canvas.addEventListener("webglcontextlost", () => {
       this.depthTexture.dispose();
       this.target?.dispose();
     });
   }
 
-  /** Shows a part of a picture: all of it, or a tile. */
+  /** Shows a part of an image: all of it, or a tile. */
   show(
     header: PictureHeader,
     image: ImageBitmap | ImageData,
     depth: Uint16Array,
     viewpoint: Viewpoint | null,
   ): void {
-    this.fit();
+    this.resizeTarget();
     const texture = new Texture(image);
     texture.flipY = false;
     texture.generateMipmaps = false;
@@ -144,19 +144,19 @@ export class Pictures {
     this.draw(texture, header, false);
     texture.dispose();
     if (image instanceof ImageBitmap) image.close();
-    this.depth.put(header, depth);
+    this.depth.addPart(header, depth);
     this.uploadDepth();
     this.viewpoint = viewpoint ?? this.viewpoint;
     this.surface.visible = true;
     this.viewport.invalidate();
   }
 
-  /** Shows a picture of the page's own, of the view as it is: `draw` puts it into a framebuffer of a size. */
+  /** Shows an image drawn by the page for the current camera: `draw` draws it into a framebuffer of a size. */
   showOwn(
     { width, height, values }: Distances,
     draw: (framebuffer: WebGLFramebuffer | null, across: number, down: number) => void,
   ): void {
-    this.fit();
+    this.resizeTarget();
     const { renderer } = this.viewport;
     const gl = renderer.getContext();
     renderer.setRenderTarget(this.target);
@@ -164,14 +164,14 @@ export class Pictures {
     draw(framebuffer, this.target?.width ?? 1, this.target?.height ?? 1);
     renderer.resetState();
     renderer.setRenderTarget(null);
-    this.depth.take(width, height, values);
+    this.depth.replace(width, height, values);
     this.uploadDepth();
     this.viewpoint = {
       viewProjection: this.viewport.viewProjection,
       eye: this.viewport.camera.position.clone(),
     };
     this.surface.visible = true;
-    this.follow();
+    this.updateSurface();
   }
 
   private uploadDepth(): void {
@@ -182,14 +182,14 @@ export class Pictures {
     this.depthTexture.needsUpdate = true;
   }
 
-  /** Makes the texture as large as the canvas; what it shows is kept. */
-  private fit(): void {
+  /** Resizes the texture to the canvas and keeps its content. */
+  private resizeTarget(): void {
     const { width, height } = this.viewport.pixels;
     const old = this.target;
     if (old?.width === width && old.height === height) return;
     this.target = new WebGLRenderTarget(width, height, {
       depthBuffer: false,
-      // As large as the canvas: between pixels there is nothing to interpolate, which costs much in software.
+      // The texture has the size of the canvas, so that no interpolation, costly in software, is needed.
       minFilter: NearestFilter,
       magFilter: NearestFilter,
       generateMipmaps: false,
@@ -221,11 +221,11 @@ export class Pictures {
     renderer.setRenderTarget(null);
   }
 
-  /** Chooses between the picture as it is and the picture as a surface seen from elsewhere. */
-  private follow(): void {
+  /** Chooses between the image as it is and the image as a surface in space. */
+  private updateSurface(): void {
     const { uniforms } = this.surface.material;
     const now = this.viewport.viewProjection;
-    const moved = this.viewpoint !== null && !alike(now, this.viewpoint.viewProjection);
+    const moved = this.viewpoint !== null && !areSimilar(now, this.viewpoint.viewProjection);
     this.surface.geometry = moved ? this.grid : this.quad;
     this.surface.material.depthTest = this.surface.material.depthWrite = moved;
     uniforms.flat_.value = !moved;
@@ -233,11 +233,11 @@ export class Pictures {
     (uniforms.toWorld.value as Matrix4).copy(this.viewpoint.viewProjection).invert();
     (uniforms.pictureEye.value as Vector3).copy(this.viewpoint.eye);
     let far = 0;
-    for (const distance of this.depth.data) if (distance < NOTHING && distance > far) far = distance;
+    for (const distance of this.depth.data) if (distance < EMPTY_DISTANCE && distance > far) far = distance;
     uniforms.far.value = far > 0 ? 1.05 * far : 10;
   }
 }
 
-function alike(a: Matrix4, b: Matrix4): boolean {
+function areSimilar(a: Matrix4, b: Matrix4): boolean {
   return a.elements.every((x, i) => Math.abs(x - b.elements[i]) <= 1e-6 * (1 + Math.abs(x)));
 }

@@ -1,23 +1,23 @@
-/** Values that come often, given on less often: the newest, once in so many milliseconds; the last is never lost. */
+/** Throttle of frequent values: forwards the newest once per interval, and never drops the last one. */
 export class Throttle<T> {
-  private given = -Infinity;
+  private lastTime = -Infinity;
   private timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(
-    private readonly every: number,
-    private readonly give: (value: T) => void,
+    private readonly intervalMs: number,
+    private readonly forward: (value: T) => void,
   ) {}
 
-  /** Gives the value on now, where it is time or `atOnce`; else as soon as it is, unless a newer one has come. */
+  /** Forwards a value now if the interval is over or `atOnce`; else at its end, unless a newer value arrives. */
   put(value: T, atOnce = false): void {
     clearTimeout(this.timer);
-    const wait = atOnce ? 0 : this.given + this.every - performance.now();
-    if (wait > 0) this.timer = setTimeout(() => this.pass(value), wait);
-    else this.pass(value);
+    const wait = atOnce ? 0 : this.lastTime + this.intervalMs - performance.now();
+    if (wait > 0) this.timer = setTimeout(() => this.forwardNow(value), wait);
+    else this.forwardNow(value);
   }
 
-  private pass(value: T): void {
-    this.given = performance.now();
-    this.give(value);
+  private forwardNow(value: T): void {
+    this.lastTime = performance.now();
+    this.forward(value);
   }
 }

@@ -1,4 +1,4 @@
-/** The canvas: three's scene and camera, orbiting, and frames drawn only when something is other than before. */
+/** The canvas: three's scene and camera, orbit controls, and redraws on demand. */
 import {
   MathUtils,
   Matrix4,
@@ -14,12 +14,12 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { ScreenPoint } from "../editing/picking";
 import type { Vec3 } from "../net/protocol";
 
-const MOST_PIXELS_PER_POINT = 2;
+const MAX_DEVICE_PIXEL_RATIO = 2;
 
-/** Milliseconds between frames that were not drawn one after the other, at least. */
-const SLOWEST_FRAME = 100;
+/** Time in ms above which two frames do not count as consecutive. */
+const MAX_FRAME_MS = 100;
 
-/** Whether pages are drawn by the processor: then only lines and dots are smooth, which see to it themselves. */
+/** Whether the browser renders in software: antialiasing is then left to the shaders of lines and dots. */
 function isSoftware(): boolean {
   const gl = document.createElement("canvas").getContext("webgl2");
   const information = gl?.getExtension("WEBGL_debug_renderer_info");
@@ -29,7 +29,7 @@ function isSoftware(): boolean {
   return /swiftshader|llvmpipe|software/i.test(name);
 }
 
-/** A renderer whose canvas lets nothing through: the browser then need not blend it with what is behind. */
+/** A renderer with an opaque canvas, which the browser need not blend with the page behind it. */
 function opaqueRenderer(antialias: boolean): WebGLRenderer {
   const canvas = document.createElement("canvas");
   const context = canvas.getContext("webgl2", {
@@ -43,24 +43,24 @@ function opaqueRenderer(antialias: boolean): WebGLRenderer {
 }
 
 export class Viewport {
-  /** Whether the processor draws the page. */
+  /** Whether the browser renders in software. */
   readonly software = isSoftware();
   readonly renderer = opaqueRenderer(!this.software);
   readonly scene = new Scene();
   readonly camera = new PerspectiveCamera(50, 1, 0.01, 1000);
   orbit: OrbitControls | null = null;
-  /** Called before each frame is drawn, and with the time at which the next one could begin. */
+  /** Called before each redraw; and after it, with the time at which the next frame can begin. */
   beforeFrame: (() => void)[] = [];
   afterFrame: ((time: number) => void)[] = [];
   /** Milliseconds from one frame to the next, smoothed. */
   frameTime = 16;
-  /** Called when the camera or the canvas is another. */
-  cameraChanged: (() => void)[] = [];
-  /** Called when the user turns the view, or goes to another one. */
-  taken: (() => void)[] = [];
-  /** Called when the orbit's centre was guessed: it lies beside the middle of what there is to see. */
-  guessed: (() => void)[] = [];
-  private around: Vec3 = [0, 0, 0];
+  /** Called when the camera or the size of the canvas changes. */
+  cameraChanges: (() => void)[] = [];
+  /** Called when the user turns the view or chooses another one. */
+  userTurns: (() => void)[] = [];
+  /** Called when the orbit's center is only a guess: the point of the camera's axis closest to the scene's center. */
+  orbitGuessed: (() => void)[] = [];
+  private sceneCenter: Vec3 = [0, 0, 0];
   private scheduled = false;
   private size = new Vector2(1, 1);
 
@@ -89,7 +89,7 @@ export class Viewport {
     return { width: this.size.x, height: this.size.y };
   }
 
-  /** Draws a frame as soon as the browser shows one. */
+  /** Schedules a redraw for the browser's next frame. */
   invalidate(): void {
     if (this.scheduled) return;
     this.scheduled = true;
@@ -100,76 +100,76 @@ export class Viewport {
       this.renderer.clear();
       this.renderer.render(this.scene, this.camera);
       requestAnimationFrame((time) => {
-        this.frameTime += 0.2 * (Math.min(time - began, SLOWEST_FRAME) - this.frameTime);
+        this.frameTime += 0.2 * (Math.min(time - began, MAX_FRAME_MS) - this.frameTime);
         for (const action of this.afterFrame) action(time);
       });
     });
   }
 
-  /** Looks from a camera-to-world pose, row by row, and orbits around the point of its axis next to `around`. */
+  /** Looks from a camera-to-world matrix, row by row, and orbits around the point of its axis closest to `around`. */
   lookFrom(c2w: readonly number[], fov_y_deg: number, up: Vec3, around: Vec3): void {
-    this.take();
+    this.notifyUserTurn();
     const { camera } = this;
     if (this.orbit === null || camera.up.distanceTo(new Vector3(...up)) > 1e-6) {
       camera.up.set(...up);
       this.orbit?.dispose();
       this.orbit = new OrbitControls(camera, this.canvas);
       this.orbit.zoomToCursor = true;
-      this.orbit.addEventListener("start", () => this.take());
-      this.orbit.addEventListener("change", () => this.changed());
+      this.orbit.addEventListener("start", () => this.notifyUserTurn());
+      this.orbit.addEventListener("change", () => this.updateCamera());
     }
-    // Only now: a new orbit turns the camera to its centre.
-    this.place(c2w, fov_y_deg);
-    this.around = around;
-    this.settle();
+    // After the creation of the orbit, which turns the camera to its center.
+    this.setPose(c2w, fov_y_deg);
+    this.sceneCenter = around;
+    this.resetOrbit();
     this.orbit.update();
   }
 
-  /** Looks from a pose as it is, however it leans, until the view is settled. */
+  /** Looks from a pose exactly, roll included, until the orbit is reset. */
   pose(c2w: readonly number[], fov_y_deg: number): void {
-    this.place(c2w, fov_y_deg);
-    this.changed();
+    this.setPose(c2w, fov_y_deg);
+    this.updateCamera();
   }
 
-  /** Orbits, once the view is turned, around the point of the camera's axis next to the middle of everything. */
-  settle(): void {
+  /** Sets the orbit's center to the point of the camera's axis closest to the scene's center. */
+  resetOrbit(): void {
     if (this.orbit === null) return;
-    const to = new Vector3(...this.around).sub(this.camera.position);
+    const to = new Vector3(...this.sceneCenter).sub(this.camera.position);
     this.orbitAt(Math.max(to.dot(this.forward), 0.1));
-    this.changed();
-    for (const action of this.guessed) action();
+    this.updateCamera();
+    for (const action of this.orbitGuessed) action();
   }
 
-  /** Orbits around the point of the camera's axis at this distance. */
+  /** Sets the orbit's center to the point of the camera's axis at a distance. */
   orbitAt(distance: number): void {
     this.orbit?.target.copy(this.camera.position).addScaledVector(this.forward, distance);
   }
 
-  /** Moves the camera along its axis, and turns its orbit, so that a ball fills much of the view. */
+  /** Centers the orbit on a sphere and moves the camera so that the sphere fills most of the view. */
   focus(centre: Vec3, radius: number): void {
     if (this.orbit === null) return;
-    this.take();
+    this.notifyUserTurn();
     const away = this.camera.position.clone().sub(this.orbit.target).normalize();
     const narrow = Math.min(1, this.camera.aspect) * Math.tan(MathUtils.degToRad(this.camera.fov / 2));
     this.orbit.target.set(...centre);
     this.camera.position.copy(this.orbit.target).addScaledVector(away, (1.6 * radius) / narrow);
     this.orbit.update();
-    this.changed();
+    this.updateCamera();
   }
 
-  /** Camera-to-world pose, row by row. */
+  /** Camera-to-world matrix, row by row. */
   get c2w(): number[] {
     this.camera.updateMatrixWorld();
     return this.camera.matrixWorld.clone().transpose().toArray();
   }
 
-  /** World to clip coordinates of the camera as it is. */
+  /** Matrix from world to clip coordinates of the current camera. */
   get viewProjection(): Matrix4 {
     this.camera.updateMatrixWorld();
     return this.camera.projectionMatrix.clone().multiply(this.camera.matrixWorldInverse);
   }
 
-  /** Where a point is on the canvas, in CSS pixels from the left and the top. */
+  /** Projection of a world point to CSS pixels from the left and the top of the canvas. */
   readonly project = (point: Vec3): ScreenPoint => {
     this.camera.updateMatrixWorld();
     const seen = new Vector3(...point).applyMatrix4(this.camera.matrixWorldInverse);
@@ -178,7 +178,7 @@ export class Viewport {
     return { x: (0.5 + 0.5 * clip.x) * this.size.x, y: (0.5 - 0.5 * clip.y) * this.size.y, depth };
   };
 
-  /** A CSS pixel in normalised device coordinates. */
+  /** A CSS pixel in normalized device coordinates. */
   device(x: number, y: number): { x: number; y: number } {
     return { x: (2 * x) / this.size.x - 1, y: 1 - (2 * y) / this.size.y };
   }
@@ -191,26 +191,26 @@ export class Viewport {
     return new Ray(this.camera.position.clone(), through.sub(this.camera.position).normalize());
   }
 
-  /** The direction in which the camera looks. */
+  /** Unit viewing direction of the camera. */
   get forward(): Vector3 {
     return new Vector3(0, 0, -1).applyQuaternion(this.camera.getWorldQuaternion(new Quaternion()));
   }
 
-  private place(c2w: readonly number[], fov_y_deg: number): void {
+  private setPose(c2w: readonly number[], fov_y_deg: number): void {
     const pose = new Matrix4().fromArray([...c2w]).transpose();
     this.camera.fov = fov_y_deg;
     this.camera.position.setFromMatrixPosition(pose);
     this.camera.quaternion.setFromRotationMatrix(pose);
   }
 
-  private take(): void {
-    for (const action of this.taken) action();
+  private notifyUserTurn(): void {
+    for (const action of this.userTurns) action();
   }
 
-  private changed(): void {
+  private updateCamera(): void {
     this.camera.updateProjectionMatrix();
     this.camera.updateMatrixWorld();
-    for (const action of this.cameraChanged) action();
+    for (const action of this.cameraChanges) action();
     this.invalidate();
   }
 
@@ -218,9 +218,9 @@ export class Viewport {
     const { clientWidth, clientHeight } = this.host;
     if (clientWidth === 0 || clientHeight === 0) return;
     this.size.set(clientWidth, clientHeight);
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MOST_PIXELS_PER_POINT));
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_DEVICE_PIXEL_RATIO));
     this.renderer.setSize(clientWidth, clientHeight);
     this.camera.aspect = clientWidth / clientHeight;
-    this.changed();
+    this.updateCamera();
   }
 }

@@ -1,10 +1,10 @@
-/** The socket to the server: opened again by itself, ever more patiently, when it is lost. */
+/** WebSocket connection to the server, with reconnection after exponentially growing waits. */
 import type { PageMessage, ServerMessage } from "./protocol";
 
-const FIRST_WAIT = 250;
-const LONGEST_WAIT = 4000;
+const MIN_WAIT_MS = 250;
+const MAX_WAIT_MS = 4000;
 
-/** What of a WebSocket is used, so that tests can stand in for it. */
+/** The members of a WebSocket that are used; tests substitute them. */
 export type Socket = Pick<
   WebSocket,
   "binaryType" | "readyState" | "onopen" | "onclose" | "onmessage" | "send"
@@ -12,16 +12,16 @@ export type Socket = Pick<
 
 export interface Handlers {
   opened(): void;
-  /** The socket is gone; the next attempt is in `wait` milliseconds. */
+  /** The connection is lost; the next attempt follows in `wait` milliseconds. */
   lost(wait: number): void;
   message(message: ServerMessage): void;
-  /** A header, and bytes behind it; see `picture_message`. */
+  /** A binary message; see `picture_message`. */
   binary(bytes: ArrayBuffer): void;
 }
 
 export class Connection {
   private socket: Socket | null = null;
-  private wait = FIRST_WAIT;
+  private wait = MIN_WAIT_MS;
 
   constructor(
     private readonly open: () => Socket,
@@ -30,7 +30,7 @@ export class Connection {
     this.connect();
   }
 
-  /** Sends a message; false where nobody is there to take it. */
+  /** Sends a message; false without a connection. */
   send(message: PageMessage): boolean {
     if (this.socket?.readyState !== 1) return false;
     this.socket.send(JSON.stringify(message));
@@ -42,7 +42,7 @@ export class Connection {
     this.socket = socket;
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
-      this.wait = FIRST_WAIT;
+      this.wait = MIN_WAIT_MS;
       this.handlers.opened();
     };
     socket.onmessage = ({ data }: MessageEvent<string | ArrayBuffer>) => {
@@ -53,12 +53,12 @@ export class Connection {
       this.socket = null;
       this.handlers.lost(this.wait);
       setTimeout(() => this.connect(), this.wait);
-      this.wait = Math.min(2 * this.wait, LONGEST_WAIT);
+      this.wait = Math.min(2 * this.wait, MAX_WAIT_MS);
     };
   }
 }
 
-/** The address of the server's socket, with the page's token where its link has one. */
+/** Address of the server's socket, with the token of the page's link, if any. */
 export function socketAddress(page: Location): string {
   const address = new URL("socket", page.href);
   address.protocol = page.protocol === "https:" ? "wss:" : "ws:";

@@ -1,14 +1,14 @@
-/** Files of splats that are sent to the server, to be opened there. */
+/** Upload of splat files, which the server then opens. */
 
-/** What the server reads, by the ends of names. */
-export const SPLATS = [".ply", ".spz", ".sog", ".splat", ".ksplat", ".glb", ".gltf"];
+/** Suffixes of the file names that the server reads. */
+export const SPLAT_SUFFIXES = [".ply", ".spz", ".sog", ".splat", ".ksplat", ".glb", ".gltf"];
 
-export function isSplats(name: string): boolean {
-  return SPLATS.some((end) => name.toLowerCase().endsWith(end));
+export function isSplatFile(name: string): boolean {
+  return SPLAT_SUFFIXES.some((end) => name.toLowerCase().endsWith(end));
 }
 
-/** The address that a file is sent to, with the page's token where its link has one. */
-export function openAddress(page: Location, name: string): string {
+/** Address of the upload, with the token of the page's link, if any. */
+export function uploadAddress(page: Location, name: string): string {
   const address = new URL("open", page.href);
   const query = new URLSearchParams(page.search);
   query.set("name", name);
@@ -17,7 +17,7 @@ export function openAddress(page: Location, name: string): string {
   return address.href;
 }
 
-/** What of an XMLHttpRequest is used, so that tests can stand in for it: fetch tells nothing of what it has sent. */
+/** The members of an XMLHttpRequest that are used; tests substitute them. `fetch` reports no upload progress. */
 export type Request = Pick<
   XMLHttpRequest,
   "open" | "send" | "status" | "responseText" | "onload" | "onerror"
@@ -25,8 +25,8 @@ export type Request = Pick<
   upload: Pick<XMLHttpRequestUpload, "onprogress">;
 };
 
-/** Sends a file; null once it is opened, else why it is not. `progress` is told what share has been sent. */
-export function send(
+/** Sends a file; null once the server has opened it, else the reason of the failure. `progress` gets the sent share. */
+export function uploadFile(
   request: Request,
   file: File,
   address: string,

@@ -1,4 +1,4 @@
-/** Questions before something is written: where to, how large. */
+/** Dialogs before files are written: destination, size, format. */
 import type { App } from "../app/app";
 import type { ExportSplats } from "../net/protocol";
 import { h } from "./dom";
@@ -104,7 +104,7 @@ export function dialogs(app: App): Dialogs {
       const base = (app.store.now.state?.path ?? "").replace(/\/+$/, "");
       const out = text(film ? `${base}.mp4` : `${base}-views`);
       const { width, height } = app.viewport.points;
-      const sizes = [number(even(width), 16, 4096), number(even(height), 16, 4096)];
+      const sizes = [number(roundToEven(width), 16, 4096), number(roundToEven(height), 16, 4096)];
       const fps = number(24, 1, 120);
       const overwrite = check();
       const fields = [field(film ? "File" : "Folder", out)];
@@ -126,6 +126,6 @@ export function dialogs(app: App): Dialogs {
   };
 }
 
-function even(x: number): number {
+function roundToEven(x: number): number {
   return 2 * Math.round(x / 2);
 }

@@ -1,4 +1,4 @@
-/** Elements in one expression, and the icons. */
+/** Construction of elements and icons. */
 import { createElement, type IconNode } from "lucide";
 
 type Properties<T extends keyof HTMLElementTagNameMap> = Partial<
@@ -26,7 +26,7 @@ export function icon(node: IconNode, size = 18): SVGElement {
   return createElement(node, { width: size, height: size, "stroke-width": 1.75, "aria-hidden": "true" });
 }
 
-/** A button with an icon; `title` says what it does and by which key. */
+/** A button with an icon; `title` names its action and key. */
 export function iconButton(node: IconNode, title: string, onclick: () => void, name = ""): HTMLButtonElement {
   const button = h("button", { class: `icon ${name}`, title, type: "button", onclick }, icon(node));
   button.setAttribute("aria-label", title);

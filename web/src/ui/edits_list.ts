@@ -1,4 +1,4 @@
-/** The list of edits: name, colour, shown or not, locked or not, order; and what can be done to the selected one. */
+/** The list of edits with name, color, visibility, lock and order, and the actions for the selected edit. */
 import {
   ChevronDown,
   ChevronUp,
@@ -16,7 +16,7 @@ import {
 import type { Actions } from "../editing/actions";
 import type { App } from "../app/app";
 import type { EditState } from "../net/protocol";
-import { looking, selected } from "../app/store";
+import { isReadOnly, selectedEdit } from "../app/store";
 import type { Dialogs } from "./dialogs";
 import { h, icon, iconButton, section } from "./dom";
 
@@ -69,12 +69,12 @@ export function editsList(app: App, actions: Actions, dialogs: Pick<Dialogs, "pa
     button(ChevronUp, "Earlier in the stack", () => reorder(-1), "up"),
     button(ChevronDown, "Later in the stack", () => reorder(1), "down"),
     h("span", { class: "space" }),
-    button(Trash2, "Remove (Delete)", () => actions.remove(), "remove"),
+    button(Trash2, "Remove (Delete)", () => actions.removeSelected(), "remove"),
   );
-  // Rows that show the same stay where they are: a double click on one that was made anew in between is lost.
+  // Unchanged rows are reused: a row replaced between two clicks would lose the double click.
   let rows = new Map<string, HTMLElement>();
   app.store.watch(["hello"], (now) => {
-    empty.textContent = looking(now) ? "There are no edits." : HINT;
+    empty.textContent = isReadOnly(now) ? "There are no edits." : HINT;
   });
   app.store.watch(["state"], ({ state }) => {
     const edits = state?.edits ?? [];
@@ -82,7 +82,7 @@ export function editsList(app: App, actions: Actions, dialogs: Pick<Dialogs, "pa
       const kept = rows;
       rows = new Map(
         edits.map((edit, index) => {
-          const key = shown(edit, index);
+          const key = rowKey(edit, index);
           return [key, kept.get(key) ?? row(app, edit, index)];
         }),
       );
@@ -93,14 +93,14 @@ export function editsList(app: App, actions: Actions, dialogs: Pick<Dialogs, "pa
       made.forEach((item, index) => item.classList.toggle("chosen", edits[index].id === state?.selected));
     }
     empty.hidden = edits.length > 0;
-    const none = selected(app.store.now) === null;
+    const none = selectedEdit(app.store.now) === null;
     for (const each of needSelected) each.disabled = none;
   });
   return section("Edits", list, empty, bar);
 }
 
-/** All that a row shows, but for whether it is the selected one's. */
-function shown(edit: EditState, index: number): string {
+/** Key of the content of a row, apart from the selection. */
+function rowKey(edit: EditState, index: number): string {
   return JSON.stringify([
     index,
     edit.id,
@@ -126,7 +126,7 @@ function row(app: App, edit: EditState, index: number): HTMLElement {
     edit.name || `edit ${index + 1}`,
   );
   name.ondblclick = () =>
-    !looking(app.store.now) && rename(name, edit.name, (text) => change({ name: text }));
+    !isReadOnly(app.store.now) && rename(name, edit.name, (text) => change({ name: text }));
   const problem =
     edit.problem === null
       ? null

@@ -1,4 +1,4 @@
-/** What was done, to go back to. */
+/** The list of the history's entries, each a link back to its state. */
 import type { App } from "../app/app";
 import { h, section } from "./dom";
 

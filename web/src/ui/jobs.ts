@@ -1,4 +1,4 @@
-/** Background jobs: how far they are, and a way to stop them. */
+/** Background jobs with their progress and a button to cancel them. */
 import { X } from "lucide";
 import type { App } from "../app/app";
 import type { Job } from "../net/protocol";
@@ -14,7 +14,7 @@ const GONE_AFTER = 8000;
 export function jobs(app: App): HTMLElement {
   const list = h("div", { class: "jobs" });
   app.store.watch(["jobs"], (now) => {
-    list.replaceChildren(...now.jobs.map((job) => shown(app, job)));
+    list.replaceChildren(...now.jobs.map((job) => jobRow(app, job)));
     for (const job of now.jobs.filter((each) => each.state !== "running")) {
       setTimeout(() => {
         app.store.set({ jobs: app.store.now.jobs.filter((other) => other !== job) });
@@ -24,16 +24,16 @@ export function jobs(app: App): HTMLElement {
   return list;
 }
 
-function described(job: Job): string {
+function describeJob(job: Job): string {
   const file = job.what === "splats";
   if (job.state === "running") return file ? `writing ${job.out}` : `${job.done} of ${job.total}`;
   if (job.state === "done") return file ? `${job.out} is ready` : `written to ${job.out}`;
   return job.text || job.state;
 }
 
-function shown(app: App, job: Job): HTMLElement {
+function jobRow(app: App, job: Job): HTMLElement {
   const bar = h("progress", { max: Math.max(1, job.total) });
-  // Without a value it shows that something goes on, and not how far.
+  // A progress bar without a value shows activity alone.
   if (job.what !== "splats" || job.state !== "running") bar.value = job.done;
   const stop =
     job.state === "running"
@@ -46,7 +46,7 @@ function shown(app: App, job: Job): HTMLElement {
       "div",
       { class: "row" },
       h("strong", {}, WHAT[job.what]),
-      h("span", { class: "quiet", title: job.out }, described(job)),
+      h("span", { class: "quiet", title: job.out }, describeJob(job)),
       stop,
     ),
     bar,

@@ -1,12 +1,12 @@
-/** The selected edit's options and numbers. */
+/** Options and numbers of the selected edit. */
 import { Pane, type BladeApi } from "tweakpane";
 import type { Actions } from "../editing/actions";
 import type { App } from "../app/app";
-import { extent } from "../editing/cage";
-import { leading } from "../editing/drag";
-import { tidy, type Operation } from "../editing/operations";
+import { halfExtent } from "../editing/cage";
+import { targetCage } from "../editing/drag";
+import { roundDecimals, type Operation } from "../editing/operations";
 import type { Change, EditState, Vec3 } from "../net/protocol";
-import { fillable, relightable, selected, target } from "../app/store";
+import { canFill, canRelight, selectedEdit, dragTarget } from "../app/store";
 import { h, section } from "./dom";
 
 interface Point {
@@ -43,15 +43,16 @@ export function options(app: App, actions: Actions): HTMLElement {
   };
   let filling = false;
   const change = (what: Omit<Change, "type" | "edit">): void => {
-    const edit = selected(app.store.now);
+    const edit = selectedEdit(app.store.now);
     if (!filling && edit !== null) app.send({ type: "change", edit: edit.id, ...what });
   };
   const applyNow = (operation: Operation): void => {
-    const edit = selected(app.store.now);
-    if (edit !== null) app.send({ type: "apply", edit: edit.id, target: target(app.store.now), operation });
+    const edit = selectedEdit(app.store.now);
+    if (edit !== null)
+      app.send({ type: "apply", edit: edit.id, target: dragTarget(app.store.now), operation });
   };
 
-  /** Changes the model without taking it for the user's doing, once the change that goes on is over. */
+  /** Updates the model after the change in progress, and sends nothing to the server. */
   const settle = (change: () => void): void => {
     setTimeout(() => {
       filling = true;
@@ -64,20 +65,21 @@ export function options(app: App, actions: Actions): HTMLElement {
   const numbers = pane.addFolder({ title: "Numbers" });
   const position = numbers.addBinding(model, "position", { label: "Position", format: short });
   position.on("change", ({ value, last }) => {
-    const edit = selected(app.store.now);
+    const edit = selectedEdit(app.store.now);
     if (filling || !last || edit === null) return;
-    const { pivot } = leading(app.shownCages(edit), target(app.store.now));
-    const by = vec(value).map((x, i) => tidy(x - pivot[i])) as Vec3;
+    const { pivot } = targetCage(app.shownCages(edit), dragTarget(app.store.now));
+    const by = vectorOf(value).map((x, i) => roundDecimals(x - pivot[i])) as Vec3;
     if (Math.hypot(...by) > 1e-9) applyNow({ kind: "translate", by });
   });
   numbers.addBinding(model, "turn", { label: "Turn by °", format: short }).on("change", ({ value, last }) => {
-    if (filling || !last || vec(value).every((x) => x === 0)) return;
-    applyNow({ kind: "rotate", rotation_deg: vec(value), axes: app.store.now.axes });
+    if (filling || !last || vectorOf(value).every((x) => x === 0)) return;
+    applyNow({ kind: "rotate", rotation_deg: vectorOf(value), axes: app.store.now.axes });
     settle(() => (model.turn = point(0, 0, 0)));
   });
   numbers.addBinding(model, "scale", { label: "Scale by", format: short }).on("change", ({ value, last }) => {
-    if (filling || !last || vec(value).every((x) => x === 1)) return;
-    if (vec(value).every((x) => x > 0)) applyNow({ kind: "scale", by: vec(value), axes: app.store.now.axes });
+    if (filling || !last || vectorOf(value).every((x) => x === 1)) return;
+    if (vectorOf(value).every((x) => x > 0))
+      applyNow({ kind: "scale", by: vectorOf(value), axes: app.store.now.axes });
     else app.say("scale factors must be above 0", "warning");
     settle(() => (model.scale = point(1, 1, 1)));
   });
@@ -105,10 +107,13 @@ export function options(app: App, actions: Actions): HTMLElement {
   ] as const;
   const fills = kind.addBinding(model, "fills", { label: "Fill what is uncovered" });
   fills.on("change", ({ value }) => change({ fill: value ? "surroundings" : "none" }));
-  explained(fills, "The ground or wall that the thing stood on goes on where it was; off, a hole stays (U).");
+  addTooltip(
+    fills,
+    "The ground or wall that the thing stood on goes on where it was; off, a hole stays (U).",
+  );
   const relight = kind.addBinding(model, "relight", { label: "Shadows go along", options: SHADOWS });
   relight.on("change", ({ value }) => change({ relight: value as EditState["relight"] }));
-  explained(
+  addTooltip(
     relight,
     "Soft shadows where things touch leave with the thing and appear at its new place, those of a dominant light too, where one is found, or all stay (Shift+U).",
   );
@@ -149,10 +154,10 @@ export function options(app: App, actions: Actions): HTMLElement {
 
   let marginOf: number | null = null;
   app.store.watch(["state", "mode", "cage"], (now) => {
-    const edit = selected(now);
+    const edit = selectedEdit(now);
     whole.hidden = edit === null;
     if (edit === null) return;
-    const { pivot } = leading(app.shownCages(edit), target(now));
+    const { pivot } = targetCage(app.shownCages(edit), dragTarget(now));
     Object.assign(model, {
       kind: edit.kind,
       from: edit.source?.split(/[\\/]/).at(-1) ?? "",
@@ -168,7 +173,7 @@ export function options(app: App, actions: Actions): HTMLElement {
     });
     if (marginOf !== edit.id) {
       marginOf = edit.id;
-      model.margin = tidy(0.5 * extent(edit.inner), 3);
+      model.margin = roundDecimals(0.5 * halfExtent(edit.inner), 3);
     }
     const [shell, falloff, width, lattice, error] = continuous;
     for (const binding of continuous) binding.hidden = edit.kind !== "continuous";
@@ -176,8 +181,8 @@ export function options(app: App, actions: Actions): HTMLElement {
     error.hidden = lattice.hidden || edit.lattice === 0;
     kinds.hidden = edit.source !== null;
     from.hidden = edit.source === null;
-    relight.hidden = !relightable(now);
-    fills.hidden = !fillable(now);
+    relight.hidden = !canRelight(now);
+    fills.hidden = !canFill(now);
     for (const binding of [shell, lattice, fills, relight]) binding.disabled = edit.locked;
     filling = true;
     pane.refresh();
@@ -188,8 +193,8 @@ export function options(app: App, actions: Actions): HTMLElement {
   return whole;
 }
 
-/** Gives a switch a tooltip, and its name and the tooltip to screen readers: its label is only beside it. */
-function explained(binding: BladeApi, what: string): void {
+/** Adds a tooltip to a control, and its label and tooltip for screen readers: the label is a separate element. */
+function addTooltip(binding: BladeApi, what: string): void {
   binding.element.title = what;
   const input = binding.element.querySelector("input, select")!;
   input.setAttribute("aria-label", binding.element.querySelector(".tp-lblv_l")!.textContent);
@@ -207,10 +212,10 @@ function point(x: number, y: number, z: number): Point {
   return { x, y, z };
 }
 
-function vec({ x, y, z }: Point): Vec3 {
+function vectorOf({ x, y, z }: Point): Vec3 {
   return [x, y, z];
 }
 
 function short(x: number): string {
-  return String(tidy(Number(x.toPrecision(4))));
+  return String(roundDecimals(Number(x.toPrecision(4))));
 }

@@ -1,13 +1,13 @@
-/** What lies over the picture: the split's slider, the drag's numbers, lines for the user, a lost server. */
+/** Elements over the image: the slider of the split view, the numbers of a drag, notices, the loss of the server. */
 import type { App } from "../app/app";
-import { described } from "../editing/operations";
+import { describeOperation } from "../editing/operations";
 import type { Pointer } from "../editing/pointer";
 import { h } from "./dom";
-import { looking } from "../app/store";
+import { isReadOnly } from "../app/store";
 
 const TOAST_STAYS = 7000;
 
-/** Milliseconds between changes of the readout where the processor draws the page: each costs half a frame. */
+/** Interval of the readout in ms under software rendering, where a change costs half a frame. */
 const TEXT_EVERY = 150;
 
 export function overlay(app: App, pointer: Pointer): HTMLElement {
@@ -16,7 +16,7 @@ export function overlay(app: App, pointer: Pointer): HTMLElement {
   return layer;
 }
 
-/** A bar to drag: the field before its edits on the left of it, after them on the right. */
+/** The slider of the split view: the field before the edits on its left, after the edits on its right. */
 function splitter(app: App): HTMLElement {
   const bar = h(
     "div",
@@ -38,7 +38,7 @@ function splitter(app: App): HTMLElement {
   return bar;
 }
 
-/** What the drag amounts to, beside the mouse. */
+/** Numbers of the drag, beside the mouse. */
 function readout(app: App, pointer: Pointer): HTMLElement {
   const label = h("div", { class: "readout" });
   label.hidden = true;
@@ -58,11 +58,11 @@ function readout(app: App, pointer: Pointer): HTMLElement {
     written = now;
     label.hidden = followed === null;
     if (drag === null || followed === null) return;
-    label.textContent = described(followed);
+    label.textContent = describeOperation(followed);
     label.classList.toggle("limit", drag.why !== null);
     const { width, height } = app.viewport.points;
-    const x = Math.min(pointer.at.x + 18, width - label.offsetWidth - 6);
-    const y = Math.min(pointer.at.y + 18, height - label.offsetHeight - 6);
+    const x = Math.min(pointer.position.x + 18, width - label.offsetWidth - 6);
+    const y = Math.min(pointer.position.y + 18, height - label.offsetHeight - 6);
     label.style.transform = `translate(${x}px, ${y}px)`;
   });
   return label;
@@ -92,7 +92,7 @@ function lost(app: App): HTMLElement {
   return line;
 }
 
-/** How far a file of splats is on its way to the server, and that it is being read there. */
+/** Progress of an upload of splats, and of its opening on the server. */
 function opening(app: App): HTMLElement {
   const name = h("span");
   const bar = h("progress", { max: 1 });
@@ -114,7 +114,7 @@ function hint(app: App): HTMLElement {
     "Double-click the picture to put a pair of cages around what is there",
   );
   app.store.watch(["state", "hello"], (now) => {
-    line.hidden = looking(now) || now.state === null || now.state.edits.length > 0;
+    line.hidden = isReadOnly(now) || now.state === null || now.state.edits.length > 0;
   });
   return line;
 }

@@ -1,8 +1,8 @@
-/** The camera path: keyframes, how far each edit has gone at them, playing, and rendering to a video. */
+/** The camera path: keyframes with the share of each edit, playback, and rendering to a video. */
 import { Crosshair, Download, Play, Plus, RefreshCw, Repeat, Square, Trash2 } from "lucide";
 import type { Actions } from "../editing/actions";
 import type { App } from "../app/app";
-import { duration } from "../app/camera_path";
+import { pathDuration } from "../app/camera_path";
 import type { EditState, Key, Vec3 } from "../net/protocol";
 import { h, icon, iconButton, iconLink, section } from "./dom";
 
@@ -98,7 +98,7 @@ export function pathList(
     );
   };
 
-  // Rows that show the same stay where they are: what is being typed into one that was made anew is lost.
+  // Unchanged rows are reused: a replaced row would lose the text being typed into it.
   let rows = new Map<string, HTMLElement>();
   app.store.watch(["state"], ({ state }) => {
     if (
@@ -121,7 +121,7 @@ export function pathList(
       if (list.children[index] !== item) list.insertBefore(item, list.children[index] ?? null);
     });
     while (list.children.length > made.length) list.lastElementChild?.remove();
-    const total = duration(state.keys, state.loop);
+    const total = pathDuration(state.keys, state.loop);
     length.textContent = state.keys.length === 0 ? "no keyframes" : `${total.toFixed(1)} s`;
     play.disabled = film.disabled = state.keys.length < 2;
     file.hidden = state.keys.length === 0;

@@ -1,12 +1,12 @@
-/** The line at the bottom: why a drag stopped, what the server said, how fast pictures come. */
+/** The status line: limit of a drag, notices of the server, frame rate. */
 import type { App } from "../app/app";
-import { awaited } from "../app/store";
+import { preparationText } from "../app/store";
 import { h } from "./dom";
 
-const NOTICE_STAYS = 12000;
+const NOTICE_MS = 12000;
 
-/** Milliseconds after which the renderer's preparing is worth a word: a second run is done by then. */
-const LONG = 2000;
+/** Milliseconds after which the preparation of the renderer is shown: later runs take less. */
+const MIN_PREPARATION_MS = 2000;
 
 export function status(app: App): HTMLElement {
   const message = h("span", { class: "message" });
@@ -31,19 +31,19 @@ export function status(app: App): HTMLElement {
   });
   app.store.watch(["notice"], (now) => {
     clearTimeout(until);
-    if (now.notice?.level === "info") until = setTimeout(() => app.store.set({ notice: null }), NOTICE_STAYS);
+    if (now.notice?.level === "info") until = setTimeout(() => app.store.set({ notice: null }), NOTICE_MS);
   });
   let late: ReturnType<typeof setTimeout> | undefined;
   preparing.title =
     "Kernels are compiled once for a machine; what edits uncover, and their shadows, are worked out when a scene is opened";
   app.store.watch(["preparing", "figures", "state"], (now) => {
-    const words = awaited(now);
+    const words = preparationText(now);
     if (preparing.textContent !== (words ?? "")) preparing.textContent = words;
     if (words === null) {
       clearTimeout(late);
       late = undefined;
       preparing.hidden = true;
-    } else late ??= setTimeout(() => (preparing.hidden = false), LONG);
+    } else late ??= setTimeout(() => (preparing.hidden = false), MIN_PREPARATION_MS);
   });
   app.store.watch(["figures", "state", "connection"], ({ figures: f, state, connection: c }) => {
     const speed = f.perSecond >= 0.5 && !f.final ? `${f.perSecond.toFixed(0)} pictures/s · ` : "";

@@ -1,4 +1,4 @@
-/** The column on the left: tools, Set and Edit mode, axes, which cage, snapping. */
+/** The toolbar on the left: tools, Set and Edit mode, axes, cages, snapping. */
 import {
   Axis3d,
   Box,
@@ -16,7 +16,7 @@ import {
 } from "lucide";
 import type { Actions } from "../editing/actions";
 import type { App } from "../app/app";
-import { looking, type Editor } from "../app/store";
+import { isReadOnly, type Editor } from "../app/store";
 import { h, iconButton } from "./dom";
 
 export function toolbar(app: App, actions: Actions): HTMLElement {
@@ -41,15 +41,15 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
   editing.push(snap);
   const cages = group(
     add(
-      iconButton(Square, "Move the inner cage (C)", () => actions.cage("inner"), "cage-inner"),
+      iconButton(Square, "Move the inner cage (C)", () => actions.setCage("inner"), "cage-inner"),
       (e) => e.cage === "inner",
     ),
     add(
-      iconButton(SquareDashed, "Move the outer cage (C)", () => actions.cage("outer"), "cage-outer"),
+      iconButton(SquareDashed, "Move the outer cage (C)", () => actions.setCage("outer"), "cage-outer"),
       (e) => e.cage === "outer",
     ),
     add(
-      iconButton(Boxes, "Move both cages (C)", () => actions.cage("both"), "cage-both"),
+      iconButton(Boxes, "Move both cages (C)", () => actions.setCage("both"), "cage-both"),
       (e) => e.cage === "both",
     ),
   );
@@ -57,19 +57,19 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
   bar.append(
     tools(
       add(
-        iconButton(MousePointer2, "Select: no gizmo (4, Q)", () => actions.tool("select"), "tool-select"),
+        iconButton(MousePointer2, "Select: no gizmo (4, Q)", () => actions.setTool("select"), "tool-select"),
         (e) => e.tool === "select",
       ),
       add(
-        iconButton(Move3d, "Move (1, G)", () => actions.tool("translate"), "tool-translate"),
+        iconButton(Move3d, "Move (1, G)", () => actions.setTool("translate"), "tool-translate"),
         (e) => e.tool === "translate",
       ),
       add(
-        iconButton(Rotate3d, "Rotate (2, R)", () => actions.tool("rotate"), "tool-rotate"),
+        iconButton(Rotate3d, "Rotate (2, R)", () => actions.setTool("rotate"), "tool-rotate"),
         (e) => e.tool === "rotate",
       ),
       add(
-        iconButton(Scale3d, "Scale (3, S)", () => actions.tool("scale"), "tool-scale"),
+        iconButton(Scale3d, "Scale (3, S)", () => actions.setTool("scale"), "tool-scale"),
         (e) => e.tool === "scale",
       ),
     ),
@@ -78,7 +78,7 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
         iconButton(
           PencilRuler,
           "Set mode: move cages, never the field (Tab)",
-          () => actions.mode("set"),
+          () => actions.setMode("set"),
           "mode-set",
         ),
         (e) => e.mode === "set",
@@ -87,7 +87,7 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
         iconButton(
           Spline,
           "Edit mode: the field follows the inner cage (Tab)",
-          () => actions.mode("edit"),
+          () => actions.setMode("edit"),
           "mode-edit",
         ),
         (e) => e.mode === "edit",
@@ -113,9 +113,9 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
     ),
   );
   app.store.watch(["hello", "tool", "mode", "cage", "axes", "snap", "cages"], (now) => {
-    for (const element of editing) element.hidden = looking(now);
+    for (const element of editing) element.hidden = isReadOnly(now);
     for (const [button, on] of lit) button.classList.toggle("on", on(now));
-    for (const element of setOnly) element.classList.toggle("away", now.mode !== "set" || looking(now));
+    for (const element of setOnly) element.classList.toggle("away", now.mode !== "set" || isReadOnly(now));
   });
   return bar;
 }

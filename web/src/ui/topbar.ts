@@ -1,4 +1,4 @@
-/** The row on top: the scene, undo and redo, what is shown, saving. */
+/** The bar at the top: scene, undo and redo, view, saving. */
 import {
   Camera,
   CircleQuestionMark,
@@ -15,8 +15,8 @@ import {
 } from "lucide";
 import type { Actions } from "../editing/actions";
 import type { App } from "../app/app";
-import { LOOKING, looking, type View } from "../app/store";
-import { SPLATS } from "../net/upload";
+import { READ_ONLY_NOTICE, isReadOnly, type View } from "../app/store";
+import { SPLAT_SUFFIXES } from "../net/upload";
 import type { Dialogs } from "./dialogs";
 import { h, iconButton, iconLink } from "./dom";
 
@@ -40,7 +40,7 @@ export function topbar(
   const views = VIEWS.map(([view, label]) =>
     h(
       "button",
-      { type: "button", title: `${label} (V)`, onclick: () => actions.view(view), data: { view } },
+      { type: "button", title: `${label} (V)`, onclick: () => actions.setView(view), data: { view } },
       label,
     ),
   );
@@ -53,7 +53,7 @@ export function topbar(
   const grid = iconButton(Grid3x3, "Deformed lattice (L)", () => actions.toggle("grid"), "grid");
   const file = h("input", {
     type: "file",
-    accept: [".yaml", ".yml", ".json", ...SPLATS].join(),
+    accept: [".yaml", ".yml", ".json", ...SPLAT_SUFFIXES].join(),
     hidden: true,
   });
   file.onchange = () => {
@@ -70,7 +70,7 @@ export function topbar(
     name.textContent = now.hello?.name ?? "";
     unsaved.classList.toggle("shown", now.state?.saved === false);
     save.classList.toggle("due", now.state?.saved === false);
-    const isLooking = looking(now);
+    const isLooking = isReadOnly(now);
     for (const button of [save, saveAs, load]) button.hidden = isLooking;
     undo.disabled = isLooking || (now.state?.entry ?? 0) <= 0;
     redo.disabled = isLooking || now.state === null || now.state.entry >= now.state.history.length - 1;
@@ -80,7 +80,7 @@ export function topbar(
     grid.classList.toggle("on", now.grid);
     panel.classList.toggle("on", now.panel);
     mode.textContent = isLooking ? "Read only" : now.mode === "set" ? "Set cages" : "Edit field";
-    mode.title = isLooking ? LOOKING : "";
+    mode.title = isLooking ? READ_ONLY_NOTICE : "";
     mode.dataset.mode = isLooking ? "look" : now.mode;
   });
   const screenshot = iconLink(Camera, "Screenshot of the field", "screenshot.png", "screenshot.png");
