@@ -237,7 +237,7 @@ def test_eight_bits_do_where_there_are_no_floats(page: FieldPage) -> None:
     page.page.evaluate(
         """() => {
             window.other = r;
-            const formats = { colour: gl.RGBA8, distance: gl.RGBA8, isByte: true };
+            const formats = { color: gl.RGBA8, distance: gl.RGBA8, isByte: true };
             window.r = new cagefieldViewer.SplatRenderer(gl, 1e9, formats);
         }"""
     )

@@ -1,15 +1,15 @@
 import { describe, expect, it } from "vitest";
-import { bytesOf, Filler, layoutOf, TooLarge } from "../src/field/atlas";
-import { largest } from "../src/field/gl";
-import { joined, summed } from "../src/field/level";
+import { layoutBytes, TexelWriter, createLayout, TooLarge } from "../src/field/atlas";
+import { deviceLimit } from "../src/field/gl";
+import { joinBytePlanes, undoDifferences } from "../src/field/level";
 import type { Level, Vec3 } from "../src/field/level";
 import { AdaptiveResolution } from "../src/field/adaptive_resolution";
 import { memoryLimit, RenderLocation } from "../src/field/render_location";
-import { patched } from "../src/field/page_edits";
-import { indexWith, ownBricks, readLayer } from "../src/field/page_layers";
+import { replacePart } from "../src/field/page_edits";
+import { buildLayerIndex, changedBricks, readLayer } from "../src/field/page_layers";
 import type { Layer } from "../src/field/page_layers";
-import { Places } from "../src/field/layer_offsets";
-import { Stored } from "../src/field/quantized_vertices";
+import { OffsetAllocator } from "../src/field/layer_offsets";
+import { VertexIndex } from "../src/field/quantized_vertices";
 import { ByteReader, PageFile } from "../src/field/page_file";
 import { ProgressiveStill, SETTLE_MS } from "../src/field/progressive_still";
 import { Orbit } from "../src/viewer/orbit";
@@ -60,19 +60,19 @@ function level(): Level {
 
 describe("bricks in textures", () => {
   it("repeat the vertices of the bricks behind them", () => {
-    const layout = layoutOf(level(), 256);
+    const layout = createLayout(level(), 256);
     expect(layout.dims).toEqual([2, 1, 1]);
     expect(layout.count).toBe(2);
-    const filler = new Filler(layout, [Stored.ofLevel(level())]);
-    const width = layout.across[0] * 9;
-    const slice = width * layout.across[1] * 9;
+    const filler = new TexelWriter(layout, [VertexIndex.fromLevel(level())]);
+    const width = layout.atlasBricks[0] * 9;
+    const slice = width * layout.atlasBricks[1] * 9;
     for (let n = 0; n < 2; n++) {
       const [i, j, k] = layout.index.subarray(4 * layout.bricks[n]);
-      const plane = layout.across[0] * layout.across[1];
+      const plane = layout.atlasBricks[0] * layout.atlasBricks[1];
       const layer = filler.texels(
         layout.bricks.subarray(k * plane, (k + 1) * plane),
-        layout.across[0],
-        layout.across[1],
+        layout.atlasBricks[0],
+        layout.atlasBricks[1],
       );
       const at = (x: number, y: number, z: number): number => x * slice + (j * 9 + y) * width + i * 9 + z;
       for (const [x, y, z] of [
@@ -82,22 +82,25 @@ describe("bricks in textures", () => {
       ] as Vec3[]) {
         const value = 100 * (8 * n + x) + 10 * y + z;
         expect(layer.density[at(x, y, z)]).toBe(value);
-        expect(layer.colours[0][4 * at(x, y, z)]).toBe(value & 255);
-        expect(layer.colours[0][4 * at(x, y, z) + 1]).toBe(7);
+        expect(layer.colors[0][4 * at(x, y, z)]).toBe(value & 255);
+        expect(layer.colors[0][4 * at(x, y, z) + 1]).toBe(7);
       }
       // Beyond the grid there is nothing: grey without density.
-      if (n === 1) expect([layer.density[at(5, 0, 0)], layer.colours[0][4 * at(5, 0, 0)]]).toEqual([0, 128]);
+      if (n === 1) expect([layer.density[at(5, 0, 0)], layer.colors[0][4 * at(5, 0, 0)]]).toEqual([0, 128]);
       else expect(layer.density[at(8, 1, 1)]).toBe(811);
     }
-    expect(bytesOf(layout)).toBe(layout.across.reduce((a, b) => a * b) * 729 * 6 + 8);
+    expect(layoutBytes(layout)).toBe(layout.atlasBricks.reduce((a, b) => a * b) * 729 * 6 + 8);
   });
 
   it("are refused where textures are too small", () => {
-    expect(() => layoutOf(level(), 9)).toThrow(TooLarge);
+    expect(() => createLayout(level(), 9)).toThrow(TooLarge);
   });
 });
 
-/** A layer of the same grid: vertex (9, 0, 0) has the density 7, and (9, 1, 0) none; brick 0 is as the field's. */
+/**
+ * A layer of the same grid: vertex (9, 0, 0) has the density 7, and (9, 1, 0) none; brick 0 is as the
+ * field's.
+ */
 function layer(key: string, cells = [0, 1]): Layer {
   const masks = new Uint8Array(64);
   // Of brick 1, in which (9, 0, 0) and (9, 1, 0) are the places 64 and 72.
@@ -155,7 +158,7 @@ describe("layers of a field", () => {
       [0x301, 0x402],
       [129, 130, 128, 127, 130, 130],
     ]);
-    const stored = new Stored(read, 8, read.low, read.dims);
+    const stored = new VertexIndex(read, 8, read.low, read.dims);
     expect([
       stored.slot(8, 16, 24),
       stored.slot(8, 16, 25),
@@ -165,34 +168,34 @@ describe("layers of a field", () => {
   });
 
   it("have their own vertices, and the field's where they have none", () => {
-    const layout = layoutOf(level(), 256, 3);
-    const stored = [new Stored(layer("a"), 8, [0, 0, 0], [2, 1, 1]), Stored.ofLevel(level())];
-    const { density, colours } = new Filler(layout, stored).texels([1], 1, 1);
+    const layout = createLayout(level(), 256, 3);
+    const stored = [new VertexIndex(layer("a"), 8, [0, 0, 0], [2, 1, 1]), VertexIndex.fromLevel(level())];
+    const { density, colors: colors } = new TexelWriter(layout, stored).texels([1], 1, 1);
     expect([...density.subarray(81, 81 + 3)]).toEqual([7, 901, 902]);
-    expect([...colours[0].subarray(4 * 81, 4 * 81 + 3)]).toEqual([1, 2, 3]);
+    expect([...colors[0].subarray(4 * 81, 4 * 81 + 3)]).toEqual([1, 2, 3]);
     // Emptied there, and not what the field has.
     expect([density[81 + 9], density[81 + 10]]).toEqual([0, 911]);
     expect(density[0]).toBe(800);
   });
 
   it("are found behind the field, the bricks that are as the field's where these are", () => {
-    const layout = layoutOf(level(), 256, 3);
+    const layout = createLayout(level(), 256, 3);
     const entry = (index: Uint8Array, brick: number): number[] => [
       ...index.subarray(4 * brick, 4 * brick + 4),
     ];
     const [first, second] = [layer("a"), layer("b", [2, 0])];
-    expect([...ownBricks(first, layout)]).toEqual([1]);
-    expect([...ownBricks(second, layout)]).toEqual([]);
+    expect([...changedBricks(first, layout)]).toEqual([1]);
+    expect([...changedBricks(second, layout)]).toEqual([]);
     const layers = [
       { layer: first, place: 2, first: 0, end: 2 },
       { layer: second, place: 4, first: -1, end: 2 },
     ];
-    const { dims, index } = indexWith(layout, layers, (each) => (each === first ? [2] : []));
+    const { dims, index } = buildLayerIndex(layout, layers, (each) => (each === first ? [2] : []));
     expect(dims).toEqual([6, 1, 1]);
     const place = (n: number): number[] => [
-      n % layout.across[0],
-      Math.floor(n / layout.across[0]) % layout.across[1],
-      Math.floor(n / (layout.across[0] * layout.across[1])),
+      n % layout.atlasBricks[0],
+      Math.floor(n / layout.atlasBricks[0]) % layout.atlasBricks[1],
+      Math.floor(n / (layout.atlasBricks[0] * layout.atlasBricks[1])),
       255,
     ];
     expect(entry(index, 0)).toEqual(place(0));
@@ -203,16 +206,16 @@ describe("layers of a field", () => {
   });
 
   it("take places, keep them, and free them once they are not used", () => {
-    const places = new Places(10, 15);
-    expect([...(places.take("a", 2) ?? [])]).toEqual([10, 11]);
-    expect([...(places.take("b", 2) ?? [])]).toEqual([12, 13]);
-    expect(places.take("c", 2)).toBeNull();
-    expect([places.left, places.of("c")]).toEqual([1, null]);
-    places.keep(new Set(["b"]));
-    expect([places.left, places.of("a")]).toEqual([3, null]);
-    expect([...(places.take("c", 3) ?? [])]).toEqual([10, 11, 14]);
-    expect([...(places.of("b") ?? [])]).toEqual([12, 13]);
-    places.keep(new Set());
+    const places = new OffsetAllocator(10, 15);
+    expect([...(places.allocate("a", 2) ?? [])]).toEqual([10, 11]);
+    expect([...(places.allocate("b", 2) ?? [])]).toEqual([12, 13]);
+    expect(places.allocate("c", 2)).toBeNull();
+    expect([places.left, places.get("c")]).toEqual([1, null]);
+    places.retain(new Set(["b"]));
+    expect([places.left, places.get("a")]).toEqual([3, null]);
+    expect([...(places.allocate("c", 3) ?? [])]).toEqual([10, 11, 14]);
+    expect([...(places.get("b") ?? [])]).toEqual([12, 13]);
+    places.retain(new Set());
     expect(places.left).toBe(5);
   });
 });
@@ -251,8 +254,8 @@ describe("files for pages", () => {
   });
 
   it("have differences and split bytes", () => {
-    expect([...joined(Uint8Array.from([1, 2, 3, 4]))]).toEqual([0x301, 0x402]);
-    expect([...summed(Uint8Array.from([1, 2, 250, 3]), 2)]).toEqual([129, 131, 122, 125]);
+    expect([...joinBytePlanes(Uint8Array.from([1, 2, 3, 4]))]).toEqual([0x301, 0x402]);
+    expect([...undoDifferences(Uint8Array.from([1, 2, 250, 3]), 2)]).toEqual([129, 131, 122, 125]);
   });
 });
 
@@ -321,7 +324,7 @@ describe("the render location", () => {
 describe("an occupancy", () => {
   it("changes in a part", () => {
     const before = { origin: [0, 0, 0] as Vec3, dims: [2, 3, 4] as Vec3, codes: new Uint16Array(24) };
-    const after = patched(before, [1, 1, 2], [1, 2, 2], Uint16Array.from([1, 2, 3, 4]));
+    const after = replacePart(before, [1, 1, 2], [1, 2, 2], Uint16Array.from([1, 2, 3, 4]));
     expect([...after].flatMap((code, n) => (code ? [[n, code]] : []))).toEqual([
       [18, 1],
       [19, 2],
@@ -335,7 +338,7 @@ describe("an occupancy", () => {
 describe("the viewer's camera", () => {
   const start = [1, 0, 0, 0, 0, 0, -1, -4, 0, 1, 0, 1, 0, 0, 0, 1];
 
-  it("turns about the centre and keeps its distance, to the pole and no farther", () => {
+  it("turns about the center and keeps its distance, to the pole and no farther", () => {
     const orbit = new Orbit(start, [0, 0, 1], [0, 0, 1]);
     expect(orbit.target).toEqual([0, 0, 1]);
     orbit.turn(Math.PI / 2, 0);
@@ -373,6 +376,6 @@ describe("the viewer's camera", () => {
 it("a lost context, which knows no limits, is no reason to give up", () => {
   const gl = (said: number | null): WebGL2RenderingContext =>
     ({ getParameter: () => said }) as unknown as WebGL2RenderingContext;
-  expect(largest(gl(null), 0)).toBeGreaterThan(4096);
-  expect(largest(gl(2048), 0)).toBe(2048);
+  expect(deviceLimit(gl(null), 0)).toBeGreaterThan(4096);
+  expect(deviceLimit(gl(2048), 0)).toBe(2048);
 });

@@ -170,11 +170,11 @@ describe("what is drawn", () => {
     expect(cageOverlay({ ...INITIAL, state: state(), mode: "set" }, null, [], eye).dots).toHaveLength(18);
   });
 
-  it("has the other edits in their colours, hidden ones not, and nothing where cages are off or a page plays", () => {
+  it("has the other edits in their colors, hidden ones not, and nothing where cages are off or a page plays", () => {
     const edits = [edit(), edit({ id: 2, colour: "#ff0000" }), edit({ id: 3, enabled: false })];
     const { segments } = cageOverlay({ ...INITIAL, state: state({ edits }) }, null, [], eye);
     expect(segments).toHaveLength(48);
-    expect(segments.filter(({ colour }) => colour.r > 0.99 && colour.g < 0.01)).toHaveLength(24);
+    expect(segments.filter(({ srgbColor: color }) => color.r > 0.99 && color.g < 0.01)).toHaveLength(24);
     expect(
       cageOverlay({ ...INITIAL, state: state({ edits }), cages: false }, null, [], eye).segments,
     ).toHaveLength(0);

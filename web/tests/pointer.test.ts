@@ -15,7 +15,10 @@ const PIXELS_PER_UNIT = 100;
 const CANVAS_LEFT = 10;
 const CANVAS_TOP = 20;
 
-/** Pixels of the front corners 6 and 7 of the inner cage, of the middle of the edge between 5 and 7, and of no part. */
+/**
+ * Pixels of the front corners 6 and 7 of the inner cage, of the middle of the edge between 5 and 7, and of no
+ * part.
+ */
 const CORNER_7 = { x: 130, y: 70 };
 const CORNER_6 = { x: 70, y: 70 };
 const EDGE_5_7 = { x: 130, y: 100 };

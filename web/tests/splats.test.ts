@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { depthOrder } from "../src/splats/depth_order";
-import { harmonicWords, meansOf, wholes } from "../src/splats/splat_file";
+import { harmonicWords, decodeMeans, joinHighLowBytes } from "../src/splats/splat_file";
 
 describe("splats from far to near", () => {
   const depths = { axis: [0, 0, 1] as const, offset: 2, near: 0.5 };
@@ -26,12 +26,12 @@ describe("splats from far to near", () => {
 
 describe("a file's numbers", () => {
   it("puts bytes together", () => {
-    expect([...wholes(Uint8Array.of(1, 0, 2, 255))]).toEqual([258, 255]);
+    expect([...joinHighLowBytes(Uint8Array.of(1, 0, 2, 255))]).toEqual([258, 255]);
   });
 
   it("finds means in their chunk's bounds", () => {
     const chunks = Float32Array.of(-1, 0, 2, 1, 10, 2);
-    expect([...meansOf(chunks, Uint8Array.of(0, 255, 7, 0, 255, 7), 1)]).toEqual([-1, 10, 2]);
+    expect([...decodeMeans(chunks, Uint8Array.of(0, 255, 7, 0, 255, 7), 1)]).toEqual([-1, 10, 2]);
   });
 
   it("keeps whole texels of coefficients", () => {

@@ -141,7 +141,10 @@ export class App {
     return this.connection.send(message);
   }
 
-  /** The server's answer to a question; null if the question fails (a notice says why) or the connection is lost. */
+  /**
+   * The server's answer to a question; null if the question fails (a notice says why) or the connection is
+   * lost.
+   */
   ask(question: Omit<Ask, "type" | "request">): Promise<Answer | null> {
     const request = ++this.requests;
     return new Promise((resolve) => {
@@ -195,7 +198,10 @@ export class App {
     this.lastEditId = Math.max(0, ...(this.store.now.state?.edits.map((edit) => edit.id) ?? []));
   }
 
-  /** Position of the gizmo between the chosen corners; null without chosen corners, where the pivot is the position. */
+  /**
+   * Position of the gizmo between the chosen corners; null without chosen corners, where the pivot is the
+   * position.
+   */
   get gizmoPosition(): Vector3 | null {
     const { now } = this.store;
     const edit = selectedEdit(now);

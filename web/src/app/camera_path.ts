@@ -2,13 +2,18 @@
 import { MathUtils, Matrix4, Quaternion, Vector3 } from "three";
 import type { Key, Still } from "../net/protocol";
 
-/** Duration of the path in seconds: the sum of the keys' times to the next key; the last key counts in a loop only. */
+/**
+ * Duration of the path in seconds: the sum of the keys' times to the next key; the last key counts in a loop
+ * only.
+ */
 export function pathDuration(keys: readonly Key[], loop: boolean): number {
   const legs = loop ? keys : keys.slice(0, -1);
   return keys.length < 2 ? 0 : legs.reduce((sum, key) => sum + key.seconds, 0);
 }
 
-/** The camera at a share of the path's duration: position and field of view linear, rotation spherical linear. */
+/**
+ * The camera at a share of the path's duration: position and field of view linear, rotation spherical linear.
+ */
 export function stillAt(stills: readonly Still[], share: number): Still {
   const at = MathUtils.clamp(share, 0, 1) * (stills.length - 1);
   const before = Math.min(Math.floor(at), stills.length - 2);

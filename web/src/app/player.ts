@@ -1,4 +1,7 @@
-/** Playback of the camera path: the page's camera follows the path, and frames show the edits as the video does. */
+/**
+ * Playback of the camera path: the page's camera follows the path, and frames show the edits as the video
+ * does.
+ */
 import { pathDuration, stillAt } from "./camera_path";
 import type { Ask, Answer, PageMessage, Preview, Still } from "../net/protocol";
 import type { Store } from "./store";

@@ -33,7 +33,10 @@ export interface TestApi {
     why: string | null;
     followed: Operation | null;
   } | null;
-  /** Whether the last frame is final and shows the current camera, view and edits, without a drag or a preview. */
+  /**
+   * Whether the last frame is final and shows the current camera, view and edits, without a drag or a
+   * preview.
+   */
   readonly settled: boolean;
   /** Milliseconds since the last frame or state. */
   readonly quiet: number;

@@ -3,7 +3,7 @@ import type { Color } from "three";
 import { EDGES, partCorners, haveSameCorners, type CagePart } from "./cage";
 import { cagesOf, type Cages, type Drag } from "./drag";
 import type { Dot } from "./handles";
-import { colour, type Segment } from "./lines";
+import { color, type Segment } from "./lines";
 import { visibleFaceCenters } from "./picking";
 import type { Corners, EditState, Vec3 } from "../net/protocol";
 import { dragObstacle, selectedEdit, showsCages, type Editor } from "../app/store";
@@ -29,8 +29,8 @@ const OTHER_OUTER: Stroke = { width: 1, alpha: 0.25, hiddenAlpha: 0.1 };
 const GRID: Stroke = { width: 0.8, alpha: 0.34, hiddenAlpha: 0.1 };
 const HOVER: Stroke = { width: 4, alpha: 1, hiddenAlpha: 0.9 };
 
-const WHITE = colour("#ffffff");
-const GHOST_COLOUR = colour("#c9ced6");
+const WHITE = color("#ffffff");
+const GHOST_COLOR = color("#c9ced6");
 
 /** The cages of an edit as they are drawn: those of the drag of this edit, if any. */
 export function shownCages(edit: EditState, drag: Drag | null): Cages {
@@ -57,7 +57,7 @@ export function cageOverlay(editor: Editor, drag: Drag | null, grid: Vec3[][], e
   for (const edit of editor.state.edits) {
     if (edit === chosen || !edit.enabled) continue;
     const cages = shownCages(edit, drag);
-    const tint = colour(edit.colour);
+    const tint = color(edit.colour);
     addCage(out, cages.deformed.corners, tint, OTHER);
     if (cages.outer && edit.kind === "continuous") addCage(out, cages.outer.corners, tint, OTHER_OUTER);
   }
@@ -73,12 +73,12 @@ function addSelectedEdit(
   grid: Vec3[][],
   eye: Vec3,
 ): void {
-  const tint = colour(edit.colour);
+  const tint = color(edit.colour);
   const setting = editor.mode === "set";
   const dim = edit.enabled ? 1 : 0.4;
   if (editor.grid) for (const line of grid) addPolyline(out, line, tint, GRID);
   const [first, second] = setting ? [cages.inner, cages.deformed] : [cages.deformed, cages.inner];
-  if (!haveSameCorners(first.corners, second.corners)) addCage(out, second.corners, GHOST_COLOUR, GHOST, dim);
+  if (!haveSameCorners(first.corners, second.corners)) addCage(out, second.corners, GHOST_COLOR, GHOST, dim);
   if (cages.outer) {
     const stroke = edit.kind !== "continuous" ? IDLE : setting && editor.cage !== "inner" ? OUTER_SET : OUTER;
     addCage(out, cages.outer.corners, tint.clone().lerp(WHITE, 0.35), stroke, dim);
@@ -105,7 +105,7 @@ function addSegment(out: CageOverlay, from: Vec3, to: Vec3, tint: Color, stroke:
   out.segments.push({
     from,
     to,
-    colour: tint,
+    srgbColor: tint,
     width: stroke.width,
     alpha: stroke.alpha * dim,
     hiddenAlpha: stroke.hiddenAlpha * dim,
@@ -135,7 +135,7 @@ function addDots(
     const over = hover?.kind === "face" && hover.index === index;
     out.dots.push({
       position: center,
-      colour: over ? WHITE : tint,
+      color: over ? WHITE : tint,
       size: over ? 12 : size - 1,
       shape: "square",
       filled: over,
@@ -146,7 +146,7 @@ function addDots(
     const taken = chosen.includes(index);
     out.dots.push({
       position: corner,
-      colour: over || taken ? WHITE : tint,
+      color: over || taken ? WHITE : tint,
       size: over ? 14 : taken ? 12 : size,
       shape: "round",
       filled: !taken || over,

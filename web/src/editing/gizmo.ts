@@ -149,8 +149,8 @@ export class Gizmo {
       const points = Array.from({ length: places.count }, (_, i) =>
         new Vector3().fromBufferAttribute(places, i),
       );
-      const centre = points.reduce((sum, point) => sum.add(point), new Vector3()).divideScalar(points.length);
-      for (const point of [centre, ...points]) {
+      const center = points.reduce((sum, point) => sum.add(point), new Vector3()).divideScalar(points.length);
+      for (const point of [center, ...points]) {
         const at = point.applyMatrix4(handle.matrixWorld).project(this.camera);
         if (Math.abs(at.x) > 0.98 || Math.abs(at.y) > 0.98 || !free(at)) continue;
         const around = [-1, 0, 1].flatMap((i) =>

@@ -1,4 +1,7 @@
-/** Deformed grid of the selected edit, requested from the server whenever its cages have moved, one request at a time. */
+/**
+ * Deformed grid of the selected edit, requested from the server whenever its cages have moved, one request at
+ * a time.
+ */
 import type { Cages } from "./drag";
 import type { Answer, EditState, Vec3 } from "../net/protocol";
 

@@ -13,7 +13,7 @@ import type { Viewport } from "../frames/viewport";
 
 export interface Dot {
   position: Vec3;
-  colour: Color;
+  color: Color;
   /** CSS pixels across. */
   size: number;
   shape: "round" | "square";
@@ -41,7 +41,7 @@ const FRAGMENT = `
 in vec3 tint;
 in float diameter;
 flat in float shape;
-out vec4 colour;
+out vec4 color;
 void main() {
   vec2 p = (gl_PointCoord - 0.5) * (diameter + 2.0);
   bool square = shape > 1.5;
@@ -52,7 +52,7 @@ void main() {
   vec3 middle = filled ? tint : vec3(0.08, 0.09, 0.1);
   vec3 rim = filled ? vec3(0.08, 0.09, 0.1) : tint;
   if (inside <= 0.0) discard;
-  colour = vec4(mix(rim, middle, core), inside);
+  color = vec4(mix(rim, middle, core), inside);
 }`;
 
 export class Handles {
@@ -89,7 +89,7 @@ export class Handles {
     const shown = dots.slice(0, MAX_DOTS);
     shown.forEach((dot, i) => {
       this.position.setXYZ(i, ...dot.position);
-      this.paint.setXYZW(i, dot.colour.r, dot.colour.g, dot.colour.b, dot.size);
+      this.paint.setXYZW(i, dot.color.r, dot.color.g, dot.color.b, dot.size);
       this.form.setX(i, (dot.shape === "square" ? 2 : 0) + (dot.filled ? 1 : 0));
     });
     this.position.needsUpdate = this.paint.needsUpdate = this.form.needsUpdate = true;

@@ -22,7 +22,10 @@ export function contains(corners: Corners, point: Vec3): boolean {
   return [u.x, u.y, u.z].every((x) => x >= -COORDINATE_TOLERANCE && x <= 1 + COORDINATE_TOLERANCE);
 }
 
-/** Largest share of the operation, to 1e-3, for which the cage stays inside the outer cage; 1 without an outer cage. */
+/**
+ * Largest share of the operation, to 1e-3, for which the cage stays inside the outer cage; 1 without an outer
+ * cage.
+ */
 export function containedShare(operation: Operation, cage: Posed, outer: Corners | null): number {
   if (outer === null) return 1;
   const inside = (t: number): boolean =>

@@ -25,7 +25,7 @@ import type { Viewport } from "../frames/viewport";
 export interface Segment {
   from: Vec3;
   to: Vec3;
-  colour: Color;
+  srgbColor: Color;
   /** Width of the visible part, CSS pixels. */
   width: number;
   /** Opacity of the visible part. */
@@ -85,7 +85,7 @@ in float hiddenAlpha;
 in float side;
 in float halfWidth;
 in vec2 run;
-out vec4 colour;
+out vec4 color;
 bool isHidden() {
   vec4 clip = pictureProjection * vec4(world, 1.0);
   if (clip.w <= 0.0) return false;
@@ -108,7 +108,7 @@ void main() {
   }
   alpha *= clamp(reach + 0.5 - away, 0.0, 1.0);
   if (alpha < 0.01) discard;
-  colour = vec4(tint.rgb, alpha);
+  color = vec4(tint.rgb, alpha);
 }`;
 
 export class Lines {
@@ -164,7 +164,7 @@ export class Lines {
     const { from, to, paint, stroke } = this.buffers;
     const scale = this.viewport.renderer.getPixelRatio();
     segments.forEach((segment, n) => {
-      const { r, g, b } = segment.colour;
+      const { r, g, b } = segment.srgbColor;
       for (let i = 4 * n; i < 4 * n + 4; i++) {
         from.setXYZ(i, ...segment.from);
         to.setXYZ(i, ...segment.to);
@@ -207,6 +207,6 @@ export class Lines {
 }
 
 /** An sRGB color without conversion to linear values: lines are drawn over sRGB images. */
-export function colour(text: string): Color {
+export function color(text: string): Color {
   return new Color(text).convertLinearToSRGB();
 }

@@ -73,7 +73,9 @@ export function scaleOperation(operation: Operation, t: number): Operation {
   }
 }
 
-/** Magnitude of an operation: length, angle in degrees, largest logarithm of a factor, or norm of the shears. */
+/**
+ * Magnitude of an operation: length, angle in degrees, largest logarithm of a factor, or norm of the shears.
+ */
 export function operationSize(operation: Operation): number {
   switch (operation.kind) {
     case "translate":
@@ -180,9 +182,9 @@ function diagonal([x, y, z]: Vec3): Matrix3 {
 }
 
 function transformAboutPivot(corners: Corners, pivot: Vec3, matrix: Matrix3): Corners {
-  const centre = new Vector3(...pivot);
+  const center = new Vector3(...pivot);
   return corners.map((c) =>
-    new Vector3(...c).sub(centre).applyMatrix3(matrix).add(centre).toArray(),
+    new Vector3(...c).sub(center).applyMatrix3(matrix).add(center).toArray(),
   ) as Corners;
 }
 

@@ -56,10 +56,10 @@ export function pickCorner(x: number, y: number, corners: Corners, project: Proj
 /** Centers [3] of the faces turned to the eye; null for the other faces. */
 export function visibleFaceCenters(corners: Corners, eye: Vec3): (Vec3 | null)[] {
   return FACES.map((ids, face) => {
-    const centre = centroid(corners, ids);
+    const center = centroid(corners, ids);
     const normal = faceNormal(corners, face);
-    const facing = normal.reduce((sum, n, i) => sum + n * (eye[i] - centre[i]), 0) > 0;
-    return facing ? centre : null;
+    const facing = normal.reduce((sum, n, i) => sum + n * (eye[i] - center[i]), 0) > 0;
+    return facing ? center : null;
   });
 }
 

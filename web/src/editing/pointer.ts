@@ -70,7 +70,9 @@ export class Pointer {
     return true;
   }
 
-  /** Constrains a drag of corners to a world axis, or releases the same constraint; false without such a drag. */
+  /**
+   * Constrains a drag of corners to a world axis, or releases the same constraint; false without such a drag.
+   */
   constrain(axis: "X" | "Y" | "Z"): boolean {
     if (this.hold?.kind !== "part") return false;
     this.constraint = this.constraint === axis ? null : axis;
@@ -162,7 +164,10 @@ export class Pointer {
     this.app.viewport.canvas.style.cursor = hover || this.app.gizmo.axis !== null ? "pointer" : "";
   }
 
-  /** The part of a cage under the mouse; null for none, or where the gizmo takes precedence and is highlighted. */
+  /**
+   * The part of a cage under the mouse; null for none, or where the gizmo takes precedence and is
+   * highlighted.
+   */
   private partUnderPointer(): Hover | null {
     const { now } = this.app.store;
     const edit = selectedEdit(now);

@@ -1,4 +1,7 @@
-/** Adaptive resolution: the size of moving frames, and the height of bands of still ones, from the measured cost of a pixel. */
+/**
+ * Adaptive resolution: the size of moving frames, and the height of bands of still ones, from the measured
+ * cost of a pixel.
+ */
 
 /** Shares of the full width and height at which moving frames are drawn. */
 const SCALES = [1, 0.75, 0.5, 0.35, 0.25, 0.18, 0.12];

@@ -1,37 +1,40 @@
 /**
- * A level's bricks as they lie in 3D textures: (B + 1)^3 texels each, the last of an axis those of the brick behind it,
- * so that the GPU interpolates without looking elsewhere. Textures have z of the field along their x.
+ * Brick atlas: the bricks of a level in 3D textures. A brick has (B + 1)^3 texels and shares the last texels of each axis
+ * with the next brick, so that the GPU interpolates within one brick. The x axis of a texture is the z axis of the field.
  */
-import { Stored } from "./quantized_vertices";
+import { VertexIndex } from "./quantized_vertices";
 import type { Level, Vec3 } from "./level";
 
-/** Where the bricks of a level lie in an atlas. */
-export interface Layout {
-  /** Cells along a brick's edge, and texels. */
+/** Layout of the bricks of a level in an atlas. */
+export interface AtlasLayout {
+  /** Number of cells, and of texels, along the edge of a brick. */
   brick: number;
   edge: number;
-  /** Bricks of cells along x, y and z of the field. */
+  /** Number of bricks of cells along x, y and z of the field. */
   dims: Vec3;
-  /** Bricks along x, y and z of the textures. */
-  across: Vec3;
-  /** Bricks of the level, which have the first places; the textures have more for layers. */
+  /** Number of bricks along x, y and z of the textures. */
+  atlasBricks: Vec3;
+  /** Number of bricks of the level, which come first in the textures; bricks of layers follow. */
   count: number;
-  /** [dims, 4]: place in the atlas, and 255; 0 where nothing is. z of the field fastest. */
+  /** [dims, 4]: position in the atlas, and 255; 0 for an empty brick. z of the field fastest. */
   index: Uint8Array;
-  /** [count] linear numbers of the bricks, in the order of their places. */
+  /** [count] linear indices of the bricks in the field, in the order of the atlas. */
   bricks: Int32Array;
-  /** RGBA textures of colour. */
-  colours: number;
+  /** Number of RGBA textures of color. */
+  colorTextures: number;
 }
 
 export class TooLarge extends Error {}
 
-/** The layout of a level; throws `TooLarge` where textures of at most `side` texels do not hold it and `spare` bricks. */
-export function layoutOf(level: Level, side: number, spare = 0): Layout {
+/**
+ * The layout of a level with `spare` more bricks; throws `TooLarge` beyond textures of `side` texels per
+ * edge.
+ */
+export function createLayout(level: Level, side: number, spare = 0): AtlasLayout {
   const brick = level.field.brick;
   const edge = brick + 1;
   const dims = level.header.resolution.map((n) => Math.ceil((n - 1) / brick)) as Vec3;
-  const bricks = occupiedBricks(level, dims);
+  const bricks = findOccupiedBricks(level, dims);
   const most = Math.min(255, Math.floor(side / edge));
   const all = bricks.length + spare;
   const first = Math.min(most, Math.max(1, Math.ceil(Math.cbrt(all))));
@@ -40,23 +43,37 @@ export function layoutOf(level: Level, side: number, spare = 0): Layout {
   if (third > most) throw new TooLarge(`${all} bricks do not fit into textures of ${side} texels an edge`);
   const index = new Uint8Array(4 * dims[0] * dims[1] * dims[2]);
   const across: Vec3 = [first, second, third];
-  for (const [n, number] of bricks.entries()) index.set(entryOf(n, across), 4 * number);
-  const colours = Math.ceil((3 * level.header.steps.length) / 4);
-  return { brick, edge, dims, across, count: bricks.length, index, bricks, colours };
+  for (const [n, number] of bricks.entries()) index.set(indexEntry(n, across), 4 * number);
+  const colors = Math.ceil((3 * level.header.steps.length) / 4);
+  return {
+    brick,
+    edge,
+    dims,
+    atlasBricks: across,
+    count: bricks.length,
+    index,
+    bricks,
+    colorTextures: colors,
+  };
 }
 
-/** The entry of an index for the n-th place of textures. */
-export function entryOf(n: number, [first, second]: Vec3): [number, number, number, number] {
+/** The index entry of the n-th brick of the textures. */
+export function indexEntry(n: number, [first, second]: Vec3): [number, number, number, number] {
   return [n % first, Math.floor(n / first) % second, Math.floor(n / (first * second)), 255];
 }
 
-/** Bytes of a layout's textures. */
-export function bytesOf({ across, edge, colours, index }: Layout): number {
-  return across[0] * across[1] * across[2] * edge ** 3 * (2 + 4 * colours) + index.length;
+/** Bytes of the textures of a layout. */
+export function layoutBytes({
+  atlasBricks: across,
+  edge,
+  colorTextures: colors,
+  index,
+}: AtlasLayout): number {
+  return across[0] * across[1] * across[2] * edge ** 3 * (2 + 4 * colors) + index.length;
 }
 
-/** Numbers of the bricks of cells that the occupancy holds something in. */
-function occupiedBricks(level: Level, dims: Vec3): Int32Array {
+/** Linear indices of the bricks of cells that are occupied. */
+function findOccupiedBricks(level: Level, dims: Vec3): Int32Array {
   const { codes, dims: fine } = level.occupancy;
   const share = level.field.brick / 4;
   const held = new Uint8Array(dims[0] * dims[1] * dims[2]);
@@ -70,26 +87,26 @@ function occupiedBricks(level: Level, dims: Vec3): Int32Array {
   return Int32Array.from(held.keys()).filter((number) => held[number] === 1);
 }
 
-/** What of textures is uploaded at a time. */
+/** Texels of some bricks, for one upload. */
 export interface Texels {
   density: Uint16Array;
-  colours: Uint8Array[];
+  colors: Uint8Array[];
 }
 
-/** Makes the texels of bricks of cells, from vertices of the first that has one. */
-export class Filler {
+/** Conversion of vertices to the texels of bricks; the first source that has a vertex supplies it. */
+export class TexelWriter {
   constructor(
-    private readonly layout: Layout,
-    private readonly sources: readonly Stored[],
+    private readonly layout: AtlasLayout,
+    private readonly sources: readonly VertexIndex[],
   ) {}
 
-  /** The texels of `first` by `second` bricks, or fewer, of these linear numbers. */
+  /** The texels of bricks with the given linear indices, `first` by `second` bricks or fewer. */
   texels(numbers: ArrayLike<number>, first: number, second: number): Texels {
-    const { edge, colours, brick, dims } = this.layout;
+    const { edge, colorTextures: colors, brick, dims } = this.layout;
     const count = first * second * edge ** 3;
     const out: Texels = {
       density: new Uint16Array(count),
-      colours: Array.from({ length: colours }, () => new Uint8Array(4 * count).fill(128)),
+      colors: Array.from({ length: colors }, () => new Uint8Array(4 * count).fill(128)),
     };
     const width = first * edge;
     const plane = width * second * edge;
@@ -104,7 +121,7 @@ export class Filler {
       for (let x = 0; x < edge; x++)
         for (let y = 0; y < edge; y++)
           for (let z = 0; z < edge; z++)
-            this.put(
+            this.putTexel(
               out,
               corner + x * plane + y * width + z,
               at[0] * brick + x,
@@ -115,7 +132,7 @@ export class Filler {
     return out;
   }
 
-  private put(out: Texels, texel: number, x: number, y: number, z: number): void {
+  private putTexel(out: Texels, texel: number, x: number, y: number, z: number): void {
     for (const source of this.sources) {
       const slot = source.slot(x, y, z);
       if (slot < 0) continue;
@@ -123,7 +140,7 @@ export class Filler {
       const rows = sh.length / density.length;
       out.density[texel] = density[slot];
       for (let row = 0; row < rows; row++)
-        out.colours[row >> 2][4 * texel + (row & 3)] = sh[row * density.length + slot];
+        out.colors[row >> 2][4 * texel + (row & 3)] = sh[row * density.length + slot];
       return;
     }
   }

@@ -1,14 +1,14 @@
 /**
- * The maps of an edit stack for one sample, as `cagefield.edits.device.kernels.edit_maps` has them.
+ * GLSL of the maps of an edit stack for one sample, equal to `cagefield.edits.device.kernels.edit_maps`.
  *
  * `rows` has the layout of `cagefield.pages.row_layout`. Shells come from lattices of float16, interpolated by the
  * shader: the weights of the GPU's own interpolation have 8 bits.
  */
-import { defines } from "./gl";
+import { defineNumbers } from "./gl";
 import { EDIT_LAYOUT } from "./layout";
 
 const SOURCE = `
-${defines(EDIT_LAYOUT)}
+${defineNumbers(EDIT_LAYOUT)}
 layout(std140) uniform Edits { vec4 rows[MAX_ROWS]; };
 uniform sampler2D lattice;
 uniform int editCount;
@@ -46,7 +46,7 @@ vec3 bent(int at, vec3 xi) {
     + xi.x * xi.y * xi.z * rows[at + 3].xyz;
 }
 
-// Coordinates in the hexahedron at a row, clamped to [-1,1]^3, and how far off that is.
+// Coordinates in the hexahedron at a row, clamped to [-1,1]^3, and the distance by which they were outside.
 vec3 hexahedron(vec3 p, int at, out float error) {
   vec3 y = times(at + MATRIX_VECTOR, p - rows[at + CENTER_VECTOR].xyz);
   vec3 xi = y;
@@ -123,8 +123,8 @@ void interpolate(int e, int resolution_, vec3 at, inout vec3 p, inout vec3 v) {
   v += s.x * (x0 + f.z * (x1 - x0)) + s.y * (y0 + f.z * (y1 - y0)) + s.z * (z1 - z0);
 }
 
-// Takes a sample through the edit whose numbers begin at a row. Where it is to be read then: 0 in the field, or by
-// the place of a layer, how many vertices further along x; -1 nowhere.
+// Maps a sample through the edit whose rows begin at e. Returns the offset along x, in vertices, at which the sample is
+// read: 0 in the field, the offset of a layer, or -1 for an empty sample.
 int mapEdit(int e, inout vec3 p, inout vec3 v) {
   bool continuous = rows[e + CONTINUOUS_SCALAR].w > 0.5;
   int resolution_ = int(rows[e + RESOLUTION_SCALAR].w);
@@ -155,7 +155,7 @@ int mapEdit(int e, inout vec3 p, inout vec3 v) {
 }
 
 MAP_SAMPLE
-// The part of a ray outside which no edit changes anything.
+// The interval of a ray outside which no edit has an effect.
 vec2 editedPart(vec3 origin, vec3 d) {
   vec2 part = vec2(1e30, -1e30);
   vec3 inverse_ = safeInverse(d);
@@ -179,15 +179,18 @@ vec3 throughEdits(vec3 slope, vec3 p) {
 }
 `;
 
-/** Edits that are written out one by one: constant places are read 1.7 times as fast in software, and by GPUs too. */
-const FEW = 2;
+/**
+ * Number of edits up to which the loop is unrolled: constant indices are 1.7 times as fast in software, and
+ * faster on GPUs.
+ */
+const MAX_UNROLLED_EDITS = 2;
 
-/** How many edits a shader is made for; null is one that counts them itself. */
-export function unrolled(edits: number): number | null {
-  return edits <= FEW ? edits : null;
+/** Number of edits of an unrolled shader; null for a shader with a loop. */
+export function unrolledEdits(edits: number): number | null {
+  return edits <= MAX_UNROLLED_EDITS ? edits : null;
 }
 
-/** The source for so many edits; see `unrolled`. */
+/** GLSL source for a number of edits; see `unrolledEdits`. */
 export function editsSource(count: number | null): string {
   const one = (e: string): string =>
     `if (place == 0 && inBox(p, rows[${e} + BOX_VECTOR].xyz, rows[${e} + BOX_VECTOR + 1].xyz)) place = mapEdit(${e}, p, v);`;

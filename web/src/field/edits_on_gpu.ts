@@ -1,45 +1,45 @@
-/** An edit stack on the GPU: only what is other than before is uploaded. */
+/** An edit stack on the GPU, with uploads of the changed parts alone. */
 import { EDIT_LAYOUT } from "./layout";
-import { checkMemory, largest, plainUnpacking, setFilter, texture3D } from "./gl";
+import { checkMemory, deviceLimit, resetUnpacking, setFilter, texture3D } from "./gl";
 import type { PageEdits } from "./page_edits";
 
 const { MAX_ROWS, NODES_PER_TEXTURE_ROW } = EDIT_LAYOUT;
 
 type GL = WebGL2RenderingContext;
 
-/** Where a lattice lies in the texture: rows of NODES_PER_TEXTURE_ROW nodes. */
-interface Placed {
+/** Position of a lattice in the texture, in rows of NODES_PER_TEXTURE_ROW nodes. */
+interface PlacedLattice {
   key: string;
   row: number;
 }
 
-export class EditsOnGpu {
-  /** Bytes that `set` has uploaded, the last time and in all. */
+export class EditTextures {
+  /** Bytes uploaded by the last `set`, and by all. */
   readonly uploaded = { last: 0, total: 0 };
   private current: PageEdits | null = null;
   private buffer: WebGLBuffer | null = null;
-  private lattices: { texture: WebGLTexture; rows: number; placed: Placed[] } | null = null;
+  private lattices: { texture: WebGLTexture; rows: number; placed: PlacedLattice[] } | null = null;
   private occupancy: { texture: WebGLTexture; key: string; dims: readonly number[] } | null = null;
 
   constructor(private readonly gl: GL) {}
 
-  /** The edits that are on the GPU; null for none. */
+  /** The edits on the GPU; null for none. */
   get edits(): PageEdits | null {
     return this.current;
   }
 
-  /** The codes that rays leap by. */
+  /** The occupancy codes, by which rays skip empty space. */
   get bricks(): WebGLTexture | null {
     return this.occupancy?.texture ?? null;
   }
 
-  /** Counts bytes that were uploaded for the edits elsewhere. */
-  count(bytes: number): void {
+  /** Adds bytes that were uploaded for the edits by others. */
+  countUpload(bytes: number): void {
     this.uploaded.last += bytes;
     this.uploaded.total += bytes;
   }
 
-  /** Takes other edits; throws where there are more than the shader holds, or than the GPU has memory for. */
+  /** Replaces the edits; throws for more edits than the shader or the memory of the GPU holds. */
   set(edits: PageEdits | null): void {
     this.uploaded.last = 0;
     if (edits === null || edits.edits === 0) {
@@ -54,7 +54,7 @@ export class EditsOnGpu {
     this.uploaded.total += this.uploaded.last;
   }
 
-  /** Binds the rows to the program's block, and gives the lattices' texture. */
+  /** Binds the rows to the program's uniform block; returns the texture of the lattices. */
   bind(program: WebGLProgram): WebGLTexture | null {
     const { gl } = this;
     gl.uniformBlockBinding(program, gl.getUniformBlockIndex(program, "Edits"), 0);
@@ -62,7 +62,7 @@ export class EditsOnGpu {
     return this.lattices?.texture ?? null;
   }
 
-  /** Forgets what a lost context had. */
+  /** Drops the objects of a lost context. */
   forget(): void {
     this.current = this.buffer = this.lattices = this.occupancy = null;
   }
@@ -93,18 +93,18 @@ export class EditsOnGpu {
       1,
       heights.reduce((sum, height) => sum + height, 0),
     );
-    if (rows > largest(gl, gl.MAX_TEXTURE_SIZE))
+    if (rows > deviceLimit(gl, gl.MAX_TEXTURE_SIZE))
       throw new Error("the edits' lattices do not fit into a texture of the GPU");
     if (this.lattices === null || rows > this.lattices.rows) {
       gl.deleteTexture(this.lattices?.texture ?? null);
       this.lattices = { texture: this.latticeTexture(rows), rows, placed: [] };
     }
     const { texture, placed } = this.lattices;
-    plainUnpacking(gl);
+    resetUnpacking(gl);
     gl.bindTexture(gl.TEXTURE_2D, texture);
     let row = 0;
     this.lattices.placed = lattices.map(({ key, halves }, n) => {
-      const at: Placed = { key, row };
+      const at: PlacedLattice = { key, row };
       if (placed.every((before) => before.key !== key || before.row !== at.row)) {
         const whole = 3 * NODES_PER_TEXTURE_ROW * heights[n];
         const data = halves.length === whole ? halves : new Uint16Array(whole);
@@ -141,7 +141,7 @@ export class EditsOnGpu {
   private putOccupancy({ occupancy: { key, dims, codes, changed } }: PageEdits): void {
     const { gl, occupancy: before } = this;
     if (before?.key === key) return;
-    plainUnpacking(gl);
+    resetUnpacking(gl);
     const fits = before !== null && before.dims.every((n, axis) => n === dims[axis]);
     if (!fits) gl.deleteTexture(before?.texture ?? null);
     const texture = fits ? before.texture : texture3D(gl, gl.R16UI, [dims[2], dims[1], dims[0]], gl.NEAREST);

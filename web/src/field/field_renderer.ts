@@ -1,61 +1,61 @@
 /**
- * Draws a voxel field and its edits with the page's own GPU, in any WebGL2 context; needs no extension.
+ * Renderer of a voxel field and its edits for any WebGL2 context, without extensions.
  *
  *     const renderer = new FieldRenderer(gl);
  *     renderer.setSize(800, 600);
  *     renderer.setCamera({ c2w, fx, fy, cx, cy, width: 800, height: 600 });
  *     await renderer.load(await fetch(url).then((answer) => answer.body), { onLevel: draw });
- *     renderer.render();          // into renderer.colour, renderer.depth (float bits) and, if wanted, renderer.normals
+ *     renderer.render();          // into renderer.color, renderer.depth (float bits) and, on request, renderer.normals
  *     renderer.show();            // onto the canvas
  *
- * It leaves the context's state changed: three.js wants `resetState()` after it.
+ * Drawing changes the state of the context: three.js needs `resetState()` afterwards.
  */
-import { unrolled } from "./edits_glsl";
-import { EditsOnGpu } from "./edits_on_gpu";
-import { OutOfMemory, programOf } from "./gl";
+import { unrolledEdits } from "./edits_glsl";
+import { EditTextures } from "./edits_on_gpu";
+import { OutOfMemory, createProgram } from "./gl";
 import type { Program } from "./gl";
 import { readLevels } from "./level";
 import type { Level, Vec3 } from "./level";
-import { fragment } from "./march_glsl";
-import type { Variant } from "./march_glsl";
-import { reachOf, setField, setView } from "./march_uniforms";
+import { marchShader } from "./march_glsl";
+import type { MarchVariant } from "./march_glsl";
+import { distanceRange, setFieldUniforms, setCameraUniforms } from "./march_uniforms";
 import type { PinholeCamera } from "./march_uniforms";
 import { readEdits } from "./page_edits";
 import type { PageEdits } from "./page_edits";
 import type { PlacedLayer } from "./page_layers";
 import type { Bytes } from "./page_file";
-import { plainState, unbind, WHOLE } from "./present";
+import { resetState, unbindAll, FULL_SCREEN_TRIANGLE } from "./present";
 import { ShownField } from "./shown_field";
 import type { LoadOptions, RenderOptions, SceneDrawer } from "./scene_drawer";
-import { Targets } from "./targets";
-import type { Reading } from "./targets";
-import { Views } from "./views";
+import { RenderTargets } from "./targets";
+import type { RenderedImage } from "./targets";
+import { ViewPasses } from "./views";
 import type { Distances, View } from "./views";
 
 type GL = WebGL2RenderingContext;
 
-/** Bytes of textures that a field may take unless the caller says otherwise. */
-const MEMORY = 768 * 2 ** 20;
+/** Default limit of the bytes of a field's textures. */
+const DEFAULT_MEMORY_BYTES = 768 * 2 ** 20;
 
 export class FieldRenderer implements SceneDrawer<PageEdits> {
   background: Vec3 = [1, 1, 1];
   near = 0;
-  /** Whether the edits are seen; false shows the field before them. */
+  /** Whether the edits are applied; false draws the field before the edits. */
   edited = true;
-  /** Distance between samples in voxels; null is the file's. */
+  /** Distance between samples in voxels; null for that of the file. */
   step: number | null = null;
-  readonly targets: Targets;
+  readonly targets: RenderTargets;
   readonly inBands = true;
   readonly inOrder = true;
   readonly editable = true;
   /** Never called: voxels need no depth order. */
   onOrder: (() => void) | null = null;
-  /** Milliseconds that the last new shader took to compile. */
+  /** Milliseconds of the last compilation of a shader. */
   compileTime = 0;
   compiled = 0;
-  private shown: ShownField | null = null;
-  private readonly onGpu: EditsOnGpu;
-  private readonly views: Views;
+  private shownField: ShownField | null = null;
+  private readonly editTextures: EditTextures;
+  private readonly viewPasses: ViewPasses;
   private camera: PinholeCamera | null = null;
   private loading = 0;
   private readonly programs = new Map<string, Program>();
@@ -63,32 +63,32 @@ export class FieldRenderer implements SceneDrawer<PageEdits> {
 
   constructor(
     private readonly gl: GL,
-    private readonly memory = MEMORY,
+    private readonly memory = DEFAULT_MEMORY_BYTES,
   ) {
-    this.targets = new Targets(gl);
-    this.views = new Views(gl, this.targets);
-    this.onGpu = new EditsOnGpu(gl);
+    this.targets = new RenderTargets(gl);
+    this.viewPasses = new ViewPasses(gl, this.targets);
+    this.editTextures = new EditTextures(gl);
     this.vertices = gl.createVertexArray();
   }
 
   /** The level that is drawn. */
   get level(): Level | null {
-    return this.shown?.level ?? null;
+    return this.shownField?.level ?? null;
   }
 
-  /** Bytes of edits that were uploaded, the last time and in all. */
+  /** Bytes of edits uploaded by the last `setEdits`, and by all. */
   get uploaded(): { readonly last: number; readonly total: number } {
-    return this.onGpu.uploaded;
+    return this.editTextures.uploaded;
   }
 
   /** The edits that are drawn. */
-  private get active(): PageEdits | null {
-    return this.edited ? this.onGpu.edits : null;
+  private get activeEdits(): PageEdits | null {
+    return this.edited ? this.editTextures.edits : null;
   }
 
   /** Bytes of the field's textures. */
   get bytes(): number {
-    return this.shown?.textures.bytes ?? 0;
+    return this.shownField?.textures.bytes ?? 0;
   }
 
   setSize(width: number, height: number): void {
@@ -99,7 +99,7 @@ export class FieldRenderer implements SceneDrawer<PageEdits> {
     this.camera = camera;
   }
 
-  /** Loads a field; a later call takes the place of one that is under way. Throws `TooLarge` beyond the memory. */
+  /** Loads a field; a later call replaces one in progress. Throws `TooLarge` beyond the memory limit. */
   async load(source: ReadableStream<Bytes> | ArrayBuffer, options: LoadOptions = {}): Promise<void> {
     const turn = ++this.loading;
     const wanted = (): boolean => turn === this.loading;
@@ -111,14 +111,14 @@ export class FieldRenderer implements SceneDrawer<PageEdits> {
     }
   }
 
-  /** Uploads what was shown again, after the context was lost and restored. */
+  /** Uploads the field again after the context was lost and restored. */
   async restore(): Promise<void> {
-    const { shown } = this;
-    const { edits } = this.onGpu;
+    const { shownField: shown } = this;
+    const { edits } = this.editTextures;
     this.programs.clear();
     this.vertices = this.gl.createVertexArray();
-    this.shown = null;
-    for (const part of [this.targets, this.views, this.onGpu]) part.forget();
+    this.shownField = null;
+    for (const part of [this.targets, this.viewPasses, this.editTextures]) part.forget();
     const turn = ++this.loading;
     this.setEdits(edits);
     if (shown) await this.take(shown.level, () => turn === this.loading);
@@ -131,23 +131,23 @@ export class FieldRenderer implements SceneDrawer<PageEdits> {
   /** Edits of voxels need no preparation. */
   async prepare(): Promise<void> {}
 
-  /** The edits that the field is seen through; null for none. Uploads what is other than before. */
+  /** Replaces the edits; null for none. Uploads the changed parts. */
   setEdits(edits: PageEdits | null): void {
-    this.onGpu.set(edits);
+    this.editTextures.set(edits);
     this.putLayers();
   }
 
-  /** Draws what the camera sees into `targets`; false while there is nothing to draw. */
+  /** Draws the camera's image into `targets`; false while there is nothing to draw. */
   render(options: RenderOptions = {}): boolean {
-    const { gl, shown, camera, active } = this;
+    const { gl, shownField: shown, camera, activeEdits: active } = this;
     if (!shown || !camera || gl.isContextLost()) return false;
     const { level, textures } = shown;
     const { width, height } = this.targets;
-    const variant: Variant = {
+    const variant: MarchVariant = {
       K: level.header.steps.length,
       contracted: level.field.contracted,
       edited: active !== null,
-      edits: active && unrolled(active.edits),
+      edits: active && unrolledEdits(active.edits),
       normals: options.normals ?? false,
       count: options.count ?? false,
     };
@@ -155,10 +155,10 @@ export class FieldRenderer implements SceneDrawer<PageEdits> {
     this.targets.bind(variant.normals);
     gl.useProgram(program);
     gl.bindVertexArray(this.vertices);
-    plainState(this.gl);
+    resetState(this.gl);
     const occupancy = active && level.last ? active.occupancy : level.occupancy;
-    setField(gl, uniform, level, textures.layout, occupancy, this.step ?? level.field.step);
-    setView(gl, uniform, camera, this.targets);
+    setFieldUniforms(gl, uniform, level, textures.layout, occupancy, this.step ?? level.field.step);
+    setCameraUniforms(gl, uniform, camera, this.targets);
     gl.uniform1f(uniform("near"), this.near);
     gl.uniform3f(uniform("background"), ...this.background);
     let unit = 0;
@@ -172,11 +172,11 @@ export class FieldRenderer implements SceneDrawer<PageEdits> {
     bind(
       "bricks",
       gl.TEXTURE_3D,
-      active ? (level.last ? this.onGpu.bricks : shown.withoutLeaps) : shown.occupancy,
+      active ? (level.last ? this.editTextures.bricks : shown.fullOccupancy) : shown.occupancy,
     );
-    textures.colours.forEach((texture, n) => bind(`colourAtlas${n}`, gl.TEXTURE_3D, texture));
+    textures.colors.forEach((texture, n) => bind(`colorAtlas${n}`, gl.TEXTURE_3D, texture));
     if (active) {
-      bind("lattice", gl.TEXTURE_2D, this.onGpu.bind(program));
+      bind("lattice", gl.TEXTURE_2D, this.editTextures.bind(program));
       gl.uniform1i(uniform("editCount"), active.edits);
       gl.uniform1i(uniform("boxCount"), active.boxes);
       gl.uniform1i(uniform("preserveOpacity"), Number(active.preserveOpacity));
@@ -188,11 +188,11 @@ export class FieldRenderer implements SceneDrawer<PageEdits> {
     gl.scissor(across.first, first, across.count, count);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.disable(gl.SCISSOR_TEST);
-    unbind(gl);
+    unbindAll(gl);
     return true;
   }
 
-  /** Puts a view of what was drawn on the canvas, or in a framebuffer, of this size. */
+  /** Draws a view of the image on the canvas, or into a framebuffer, of a size. */
   show(
     width: number,
     height: number,
@@ -202,22 +202,22 @@ export class FieldRenderer implements SceneDrawer<PageEdits> {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.bindVertexArray(this.vertices);
-    plainState(this.gl);
-    this.views.show(view, this.reach, width, height);
-    unbind(this.gl);
+    resetState(this.gl);
+    this.viewPasses.show(view, this.reach, width, height);
+    unbindAll(this.gl);
   }
 
-  /** What was drawn, top row first. */
-  read(normals = false): Reading {
+  /** The drawn image, top row first. */
+  read(normals = false): RenderedImage {
     return this.targets.read(normals);
   }
 
-  /** At most about `most` distances of what was drawn, top row first. */
+  /** At most about `most` distances of the drawn image, top row first. */
   distances(most: number): Distances {
     this.gl.bindVertexArray(this.vertices);
-    plainState(this.gl);
-    const found = this.views.distances(most);
-    unbind(this.gl);
+    resetState(this.gl);
+    const found = this.viewPasses.distances(most);
+    unbindAll(this.gl);
     return found;
   }
 
@@ -225,11 +225,11 @@ export class FieldRenderer implements SceneDrawer<PageEdits> {
     this.targets.wait();
   }
 
-  /** Frees what lies on the GPU. */
+  /** Frees all GPU objects. */
   dispose(): void {
     this.loading++;
     this.drop();
-    for (const part of [this.targets, this.views, this.onGpu]) part.dispose();
+    for (const part of [this.targets, this.viewPasses, this.editTextures]) part.dispose();
     for (const { program } of this.programs.values()) this.gl.deleteProgram(program);
     this.programs.clear();
     this.gl.deleteVertexArray(this.vertices);
@@ -239,42 +239,42 @@ export class FieldRenderer implements SceneDrawer<PageEdits> {
     const shown = await ShownField.upload(this.gl, this.memory, level, this.layers, wanted);
     if (shown === null) return;
     this.drop();
-    this.shown = shown;
+    this.shownField = shown;
     this.putLayers();
   }
 
-  /** The layers that the edits' patches have. */
+  /** The layers of the edits' patches. */
   private get layers(): readonly PlacedLayer[] {
-    return this.onGpu.edits?.layers ?? [];
+    return this.editTextures.edits?.layers ?? [];
   }
 
   private putLayers(): void {
     try {
-      if (this.shown) this.onGpu.count(this.shown.putLayers(this.layers));
+      if (this.shownField) this.editTextures.countUpload(this.shownField.putLayers(this.layers));
     } catch (error) {
-      // The GPU had no memory for the field's textures with more room, and has those before no more.
+      // The GPU lacks memory for larger textures of the field, and the former ones are freed.
       if (error instanceof OutOfMemory) this.drop();
       throw error;
     }
   }
 
   private drop(): void {
-    this.shown?.dispose();
-    this.shown = null;
+    this.shownField?.dispose();
+    this.shownField = null;
   }
 
-  /** The nearest and farthest distance of the field's box from the camera. */
+  /** The smallest and the largest distance of the field's box from the camera. */
   private get reach(): [number, number] {
-    const { shown, camera } = this;
+    const { shownField: shown, camera } = this;
     if (!shown || !camera) return [0, 1];
-    return reachOf(shown.level.field.bounds, camera);
+    return distanceRange(shown.level.field.bounds, camera);
   }
 
-  private program(variant: Variant, brick: number): Program {
+  private program(variant: MarchVariant, brick: number): Program {
     const key = JSON.stringify([variant, brick]);
     let program = this.programs.get(key);
     if (!program) {
-      program = programOf(this.gl, WHOLE, fragment(variant, brick));
+      program = createProgram(this.gl, FULL_SCREEN_TRIANGLE, marchShader(variant, brick));
       this.programs.set(key, program);
       this.compileTime = program.milliseconds;
       this.compiled += 1;

@@ -1,22 +1,22 @@
-/** WebGL2 in few words. */
+/** Helpers for WebGL2: programs, textures, memory checks, limits. */
 
 type GL = WebGL2RenderingContext;
 
 /** Definitions of numbers for GLSL, one line each. */
-export function defines(numbers: Readonly<Record<string, number>>): string {
+export function defineNumbers(numbers: Readonly<Record<string, number>>): string {
   return Object.entries(numbers)
     .map(([name, value]) => `#define ${name} ${value}`)
     .join("\n");
 }
 
-/** A linked program, its uniforms' places, and how long it took until it could draw. */
+/** A linked program, the locations of its uniforms, and the milliseconds of its compilation. */
 export interface Program {
   program: WebGLProgram;
   uniform: (name: string) => WebGLUniformLocation | null;
   milliseconds: number;
 }
 
-export function programOf(gl: GL, vertex: string, fragment: string): Program {
+export function createProgram(gl: GL, vertex: string, fragment: string): Program {
   const began = performance.now();
   const program = gl.createProgram();
   for (const [type, source] of [
@@ -47,14 +47,14 @@ export function programOf(gl: GL, vertex: string, fragment: string): Program {
   return { program, uniform, milliseconds: performance.now() - began };
 }
 
-/** The GPU has not the memory for what is to be drawn. */
+/** Error: the GPU has not enough memory. */
 export class OutOfMemory extends Error {
   constructor() {
     super("the GPU has not enough memory for the field");
   }
 }
 
-/** Throws where the GPU had no memory for what it was told since the last look. */
+/** Throws `OutOfMemory` if a command since the last check exceeded the memory of the GPU. */
 export function checkMemory(gl: GL): void {
   for (
     let error = gl.getError();
@@ -64,7 +64,7 @@ export function checkMemory(gl: GL): void {
     if (error === gl.OUT_OF_MEMORY) throw new OutOfMemory();
 }
 
-/** An empty 3D texture; throws `OutOfMemory` where the GPU has none for it. */
+/** An empty 3D texture; throws `OutOfMemory` beyond the memory of the GPU. */
 export function texture3D(gl: GL, format: number, size: readonly number[], filter: number): WebGLTexture {
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_3D, texture);
@@ -79,7 +79,7 @@ export function texture3D(gl: GL, format: number, size: readonly number[], filte
   return texture;
 }
 
-/** Textures are read without mipmaps, and end at their edges. */
+/** Sets filtering without mipmaps, clamped to the edges. */
 export function setFilter(gl: GL, target: number, filter: number): void {
   gl.texParameteri(target, gl.TEXTURE_MIN_FILTER, filter);
   gl.texParameteri(target, gl.TEXTURE_MAG_FILTER, filter);
@@ -89,8 +89,8 @@ export function setFilter(gl: GL, target: number, filter: number): void {
     gl.texParameteri(target, axis, gl.CLAMP_TO_EDGE);
 }
 
-/** How pixels are unpacked: others that draw with the context may have set it otherwise. */
-export function plainUnpacking(gl: GL): void {
+/** Resets the unpacking of pixels, which other users of the context may have changed. */
+export function resetUnpacking(gl: GL): void {
   gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, null);
   gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
   gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, false);
@@ -107,9 +107,9 @@ export function plainUnpacking(gl: GL): void {
 }
 
 /**
- * A limit of the GPU, such as its largest texture. A lost context says null, and is no reason to give up: what does not
- * reach it is uploaded again once it is restored.
+ * A limit of the GPU, such as its largest texture. A lost context has no limits; all uploads are repeated once it is
+ * restored.
  */
-export function largest(gl: GL, limit: GLenum): number {
+export function deviceLimit(gl: GL, limit: GLenum): number {
   return (gl.getParameter(limit) as number | null) ?? 1 << 14;
 }

@@ -1,6 +1,9 @@
-/** Colour from spherical harmonics in RGBA textures of 8 bits: coefficient k of channel c is number 3 k + c. */
+/**
+ * GLSL of colors from spherical harmonics in 8-bit RGBA textures; coefficient k of channel c is component 3 k
+ * + c.
+ */
 
-/** The real spherical harmonics of the unit direction d, as `cagefield.fields.sh.sh_basis`. */
+/** GLSL of the real spherical harmonics of the unit direction d, equal to `cagefield.fields.sh.sh_basis`. */
 export const BASIS = [
   "0.28209479177387814",
   "-0.4886025119029199 * d.y",
@@ -29,22 +32,24 @@ export const BASIS = [
   "0.6258357354491761 * (d.x * d.x * (d.x * d.x - 3.0 * d.y * d.y) - d.y * d.y * (3.0 * d.x * d.x - d.y * d.y))",
 ];
 
-/** The function colourAt(place in the atlas, unit direction), before the clamp, and how many textures it reads. */
-export function harmonics(K: number): { source: string; colours: number } {
-  const colours = Math.ceil((3 * K) / 4);
+/**
+ * GLSL of colorAt(position in the atlas, unit direction), without the clamp, and the number of its textures.
+ */
+export function harmonicsSource(K: number): { source: string; colors: number } {
+  const colors = Math.ceil((3 * K) / 4);
   const lines = [
     `uniform float coefficientSteps[${K}];`,
-    ...Array.from({ length: colours }, (_, n) => `uniform sampler3D colourAtlas${n};`),
-    "vec3 colourAt(vec3 at, vec3 d) {",
+    ...Array.from({ length: colors }, (_, n) => `uniform sampler3D colorAtlas${n};`),
+    "vec3 colorAt(vec3 at, vec3 d) {",
     "  vec3 rgb = vec3(0.5);",
     ...Array.from(
-      { length: colours },
-      (_, n) => `  vec4 s${n} = 255.0 * textureLod(colourAtlas${n}, at, 0.0) - 128.0;`,
+      { length: colors },
+      (_, n) => `  vec4 s${n} = 255.0 * textureLod(colorAtlas${n}, at, 0.0) - 128.0;`,
     ),
   ];
   for (let k = 0; k < K; k++) {
     const channels = [0, 1, 2].map((c) => `s${(3 * k + c) >> 2}.${"xyzw"[(3 * k + c) & 3]}`);
     lines.push(`  rgb += (coefficientSteps[${k}] * (${BASIS[k]})) * vec3(${channels.join(", ")});`);
   }
-  return { source: [...lines, "  return rgb;", "}"].join("\n"), colours };
+  return { source: [...lines, "  return rgb;", "}"].join("\n"), colors };
 }

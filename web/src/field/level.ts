@@ -1,10 +1,13 @@
-/** A level of a field as it comes over the wire (see `cagefield.pages.page_field`), unpacked. */
+/** Levels of a field's file (see `cagefield.pages.page_field`). */
 import { ByteReader, PageFile } from "./page_file";
 import type { OnArrival, Bytes } from "./page_file";
 
 export type Vec3 = [number, number, number];
 
-/** A grid of codes that rays leap by (see `cagefield.rendering.voxels.occupancy`), z fastest. */
+/**
+ * Grid of occupancy codes, by which rays skip empty space (see `cagefield.rendering.voxels.occupancy`), z
+ * fastest.
+ */
 export interface Occupancy {
   origin: Vec3;
   dims: Vec3;
@@ -14,9 +17,9 @@ export interface Occupancy {
 export interface LevelHeader {
   resolution: Vec3;
   vertices: number;
-  /** Density of 1 in world units. */
+  /** Density, per world unit, of the stored value 1. */
   unit: number;
-  /** Colour coefficient of one step of 8 bits, for each of the K. */
+  /** [K]: color coefficient of one step of the 8-bit values. */
   steps: number[];
   dims: Vec3;
 }
@@ -30,21 +33,21 @@ export interface FieldHeader {
   levels: LevelHeader[];
 }
 
-/** M vertices, brick by brick. */
+/** M vertices, in the order of bricks. */
 export interface Vertices {
   bricks: Uint8Array;
   masks: Uint8Array;
-  /** [M] halves. */
+  /** [M] float16 bits. */
   density: Uint16Array;
-  /** [K, 3, M], 128 is 0. */
+  /** [K, 3, M]; 128 stands for 0. */
   sh: Uint8Array;
 }
 
-/** One level. */
+/** A level of detail of the field. */
 export interface Level extends Vertices {
   field: FieldHeader;
   header: LevelHeader;
-  /** Whether it is the full one. */
+  /** Whether the level is the finest one. */
   last: boolean;
   occupancy: Occupancy;
 }
@@ -52,7 +55,7 @@ export interface Level extends Vertices {
 const MAGIC = "cagepage";
 const VERSION = 1;
 
-/** The levels of a field's file as they arrive, coarse ones first. */
+/** The levels of a field's file in the order of their arrival, from coarse to fine. */
 export async function* readLevels(
   source: ReadableStream<Bytes> | ArrayBuffer,
   onArrival?: OnArrival,
@@ -80,25 +83,25 @@ export async function* readLevels(
   }
 }
 
-/** Densities and colours of vertices. */
+/** Decoded densities and colors of vertices. */
 export async function readValues(
   file: PageFile<unknown>,
   name: string,
 ): Promise<{ density: Uint16Array; sh: Uint8Array }> {
-  const density = joined((await file.read(`${name}.density`)) as Uint8Array);
-  return { density, sh: summed((await file.read(`${name}.sh`)) as Uint8Array, density.length) };
+  const density = joinBytePlanes((await file.read(`${name}.density`)) as Uint8Array);
+  return { density, sh: undoDifferences((await file.read(`${name}.sh`)) as Uint8Array, density.length) };
 }
 
-/** Numbers of 16 bits whose low bytes come first, then their high ones. */
-export function joined(planes: Uint8Array): Uint16Array {
+/** 16-bit numbers from a plane of low bytes and a plane of high bytes. */
+export function joinBytePlanes(planes: Uint8Array): Uint16Array {
   const count = planes.length / 2;
   const out = new Uint16Array(count);
   for (let n = 0; n < count; n++) out[n] = planes[n] | (planes[count + n] << 8);
   return out;
 }
 
-/** Rows of `count` bytes from their differences, in place. */
-export function summed(rows: Uint8Array, count: number): Uint8Array {
+/** Rows of `count` bytes from their differences along a row, in place. */
+export function undoDifferences(rows: Uint8Array, count: number): Uint8Array {
   if (count === 0) return rows;
   for (let first = 0; first < rows.length; first += count) {
     let value = 128;

@@ -1,18 +1,18 @@
 /**
- * The fused march of `cagefield.rendering.voxels.kernels.march` as a fragment shader: the same samples at
- * t_in + (k + 1/2) h, leaps by whole steps, end at T <= 1e-3, contraction, clamps and normals.
+ * The ray march of `cagefield.rendering.voxels.kernels.march` as a fragment shader: equal samples at t_in + (k + 1/2) h,
+ * skips by whole steps, end at T <= 1e-3, contraction, clamps and normals.
  *
- * Textures have z of the field along their x. Names are those of the kernels.
+ * The x axis of a texture is the z axis of the field. Names are those of the kernels.
  */
 import { editsSource } from "./edits_glsl";
-import { harmonics } from "./harmonics_glsl";
+import { harmonicsSource } from "./harmonics_glsl";
 
-export interface Variant {
-  /** Coefficients a channel: 1, 4 or 9. */
+export interface MarchVariant {
+  /** Number of coefficients per channel: 1, 4 or 9. */
   K: number;
   contracted: boolean;
   edited: boolean;
-  /** How many edits are written out; null counts them in a loop. */
+  /** Number of edits in the unrolled loop; null for a loop. */
   edits: number | null;
   normals: boolean;
   /** Writes counts in place of depth: 65536 * (texture reads / 4) + samples. */
@@ -40,7 +40,7 @@ uniform mat3 rotation;
 uniform vec4 lens;
 uniform float height;
 uniform bool layered;
-layout(location = 0) out vec4 outColour;
+layout(location = 0) out vec4 outColor;
 layout(location = 1) out uint outDepth;
 #ifdef NORMALS
 layout(location = 2) out vec4 outNormal;
@@ -100,8 +100,8 @@ vec3 toGrid(vec3 p) {
   return g;
 }
 
-// The texel, whole where a vertex is, of grid coordinates in the atlas, of the field or of the layer at a place; false
-// where their brick is empty.
+// Texel coordinates in the atlas, whole numbers at vertices, of grid coordinates in the field, or in the layer at an
+// offset; false for an empty brick.
 bool locate(vec3 g, int place, out vec3 texel, out ivec3 corner) {
   vec3 inside = clamp(g, vec3(0.0), vec3(resolution - 1));
   ivec3 b = min(ivec3(inside) / BRICK, indexDims - 1);
@@ -141,7 +141,7 @@ vec3 pullBack(vec3 slope, vec3 q) {
 `;
 
 const MAIN = `
-// Rounded here, and put amid the step: some GPUs cut off where others round.
+// Rounded here, and centered in the step of 8 bits: some GPUs truncate and others round.
 vec4 eightBits(vec4 v) { return (floor(255.0 * clamp(v, 0.0, 1.0) + 0.5) + 0.25) / 255.0; }
 
 void main() {
@@ -230,9 +230,9 @@ void main() {
         float w = T * (1.0 - keep);
         T *= keep;
         if (w > 1e-4) {
-          vec3 c = colourAt(at, view / max(length(view), 1e-20));
+          vec3 c = colorAt(at, view / max(length(view), 1e-20));
 #ifdef COUNT
-          reads += COLOURS;
+          reads += COLORS;
 #endif
           rgb += w * clamp(c, 0.0, 1.0);
           depth += w * t;
@@ -254,7 +254,7 @@ void main() {
     t += h;
   }
   float opacity = 1.0 - T;
-  outColour = eightBits(vec4(rgb + T * background, opacity));
+  outColor = eightBits(vec4(rgb + T * background, opacity));
 #ifdef COUNT
   outDepth = uint(reads / 4) << 16 | uint(samples);
 #else
@@ -267,12 +267,12 @@ void main() {
 }
 `;
 
-/** The fragment shader of a variant, for bricks of so many cells. */
-export function fragment(variant: Variant, brick: number): string {
-  const { source, colours } = harmonics(variant.K);
+/** The fragment shader of a variant, for bricks of `brick` cells per edge. */
+export function marchShader(variant: MarchVariant, brick: number): string {
+  const { source, colors } = harmonicsSource(variant.K);
   const defines = [
     `#define BRICK ${brick}`,
-    `#define COLOURS ${colours}`,
+    `#define COLORS ${colors}`,
     "#define MOVED_POINT ((eye + t * d - lower) * scale)",
   ];
   if (variant.contracted) defines.push("#define CONTRACTED");

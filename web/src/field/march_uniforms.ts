@@ -1,11 +1,11 @@
-/** The uniforms of the march: where the field lies, and what sees it. */
-import type { Layout } from "./atlas";
+/** Uniforms of the ray march: the field's grid and the camera. */
+import type { AtlasLayout } from "./atlas";
 import type { Program } from "./gl";
 import type { Level, Occupancy, Vec3 } from "./level";
 
 type GL = WebGL2RenderingContext;
 
-/** A pinhole camera: pose camera-to-world row by row (OpenGL axes), intrinsics in pixels of its size. */
+/** A pinhole camera: camera-to-world matrix row by row (OpenGL axes), intrinsics in pixels. */
 export interface PinholeCamera {
   c2w: readonly number[];
   width: number;
@@ -16,18 +16,18 @@ export interface PinholeCamera {
   cy: number;
 }
 
-/** Places a level in the world; `step` is the distance between samples in voxels. */
-export function setField(
+/** Sets the uniforms of a level; `step` is the distance between samples in voxels. */
+export function setFieldUniforms(
   gl: GL,
   uniform: Program["uniform"],
   level: Level,
-  layout: Layout,
+  layout: AtlasLayout,
   occupancy: Occupancy,
   step: number,
 ): void {
   const { bounds, contracted } = level.field;
   const { resolution, unit, steps } = level.header;
-  const { across, edge, dims } = layout;
+  const { atlasBricks: across, edge, dims } = layout;
   const size = bounds[1].map((high, axis) => high - bounds[0][axis]);
   const scale = size.map((length, axis) => (contracted ? 2 / length : (resolution[axis] - 1) / length));
   const lower = bounds[0].map((low, axis) => (contracted ? 0.5 * (low + bounds[1][axis]) : low));
@@ -47,8 +47,8 @@ export function setField(
   gl.uniform1fv(uniform("coefficientSteps"), steps);
 }
 
-/** Sees it from a camera, in a picture of a size. */
-export function setView(
+/** Sets the uniforms of a camera, for an image of the targets' size. */
+export function setCameraUniforms(
   gl: GL,
   uniform: Program["uniform"],
   camera: PinholeCamera,
@@ -73,8 +73,8 @@ export function setView(
   gl.uniform1f(uniform("height"), height);
 }
 
-/** The nearest and farthest distance of a box from a camera. */
-export function reachOf([low, high]: readonly [Vec3, Vec3], camera: PinholeCamera): [number, number] {
+/** The smallest and the largest distance of a box from a camera. */
+export function distanceRange([low, high]: readonly [Vec3, Vec3], camera: PinholeCamera): [number, number] {
   const radius = 0.5 * Math.hypot(...high.map((x, axis) => x - low[axis]));
   const distance = Math.hypot(...high.map((x, axis) => 0.5 * (x + low[axis]) - camera.c2w[4 * axis + 3]));
   return [Math.max(0, distance - radius), distance + radius];

@@ -1,5 +1,5 @@
-/** An edit stack as it comes over the wire (see `cagefield.pages.page_edits`). */
-import { joined } from "./level";
+/** Files of edits of voxels (see `cagefield.pages.page_edits`). */
+import { joinBytePlanes } from "./level";
 import type { Occupancy, Vec3 } from "./level";
 import { ByteReader, PageFile } from "./page_file";
 import { readLayer } from "./page_layers";
@@ -15,16 +15,16 @@ interface EditsHeader {
 }
 
 export interface Lattice {
-  /** Names its content. */
+  /** Digest of the content. */
   key: string;
-  /** [nodes, 3] halves: displacements. */
+  /** [nodes, 3] float16 bits: displacements, world units. */
   halves: Uint16Array;
 }
 
-/** An occupancy of the deformed field. */
+/** Occupancy of the deformed field. */
 export interface DeformedOccupancy extends Occupancy {
   key: string;
-  /** What of it is other than in the occupancy of a key, where that is known. */
+  /** The part that differs from the occupancy with the key `of`; null if unknown. */
   changed: { of: string; low: Vec3; dims: Vec3; codes: Uint16Array } | null;
 }
 
@@ -39,7 +39,7 @@ export interface PageEdits {
   occupancy: DeformedOccupancy;
 }
 
-/** The edits of a file. What a file leaves out is that of `before`; throws where those do not have it either. */
+/** The edits of a file; `before` supplies the omitted parts. Throws for a part that neither has. */
 export async function readEdits(source: ArrayBuffer, before: PageEdits | null = null): Promise<PageEdits> {
   const file = await PageFile.open<EditsHeader>(new ByteReader(source), "cageedit", 3);
   const { header } = file;
@@ -47,7 +47,7 @@ export async function readEdits(source: ArrayBuffer, before: PageEdits | null = 
   const lattices: Lattice[] = [];
   for (const [n, { key }] of header.lattices.entries()) {
     const known = [...lattices, ...(before?.lattices ?? [])].find((lattice) => lattice.key === key);
-    lattices.push(known ?? { key, halves: joined((await file.read(`lattice.${n}`)) as Uint8Array) });
+    lattices.push(known ?? { key, halves: joinBytePlanes((await file.read(`lattice.${n}`)) as Uint8Array) });
   }
   const layers: PlacedLayer[] = [];
   for (const [n, { key, ...where }] of header.layers.entries()) {
@@ -66,10 +66,10 @@ export async function readEdits(source: ArrayBuffer, before: PageEdits | null = 
         key,
         origin,
         dims,
-        codes: patched(old, part.low, part.dims, codes),
+        codes: replacePart(old, part.low, part.dims, codes),
         changed: { ...part, codes },
       };
-    else throw new Error("the edits are the change of ones that this page has not");
+    else throw new Error("the edits are a difference to edits that this page does not have; reload it");
   }
   return {
     edits: header.edits,
@@ -82,8 +82,13 @@ export async function readEdits(source: ArrayBuffer, before: PageEdits | null = 
   };
 }
 
-/** The codes of an occupancy with others in the part that begins at `low`. */
-export function patched({ dims, codes }: Occupancy, low: Vec3, size: Vec3, part: Uint16Array): Uint16Array {
+/** The codes of an occupancy after the replacement of the part of `size` at `low`. */
+export function replacePart(
+  { dims, codes }: Occupancy,
+  low: Vec3,
+  size: Vec3,
+  part: Uint16Array,
+): Uint16Array {
   const out = codes.slice();
   let n = 0;
   for (let x = low[0]; x < low[0] + size[0]; x++)

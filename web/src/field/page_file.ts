@@ -1,4 +1,4 @@
-/** Files for pages as `cagefield.pages.page_file` writes them: a JSON header, and deflated arrays in order. */
+/** Container of files for pages (`cagefield.pages.page_file`): a JSON header, and deflated arrays in order. */
 
 export type Bytes = Uint8Array<ArrayBuffer>;
 export type Numbers = Uint8Array | Uint16Array | Int32Array | Float32Array;
@@ -10,13 +10,13 @@ interface ArrayEntry {
   bytes: number;
 }
 
-/** Bytes that arrived, and those that are to come where the sender says how many. */
+/** Callback with the number of bytes that have arrived. */
 export type OnArrival = (bytes: number) => void;
 
-/** Takes so many bytes at a time from a stream, however it is cut. */
+/** Reader of byte counts from a stream, independent of the stream's chunks. */
 export class ByteReader {
-  private held: Bytes[] = [];
-  private length = 0;
+  private chunks: Bytes[] = [];
+  private buffered = 0;
   private arrived = 0;
   private readonly source: ReadableStreamDefaultReader<Bytes>;
 
@@ -27,27 +27,27 @@ export class ByteReader {
     this.source = (source instanceof ArrayBuffer ? new Blob([source]).stream() : source).getReader();
   }
 
-  /** The next `count` bytes; throws where the stream ends before. */
+  /** The next `count` bytes; throws if the stream ends earlier. */
   async take(count: number): Promise<Bytes> {
-    while (this.length < count) {
+    while (this.buffered < count) {
       const { value, done } = await this.source.read();
       if (done) throw new Error("the file of the field is truncated");
-      this.held.push(value);
-      this.length += value.length;
+      this.chunks.push(value);
+      this.buffered += value.length;
       this.arrived += value.length;
       this.onArrival(this.arrived);
     }
     const out = new Uint8Array(count);
     let at = 0;
     while (at < count) {
-      const first = this.held[0];
+      const first = this.chunks[0];
       const part = first.subarray(0, count - at);
       out.set(part, at);
       at += part.length;
-      if (part.length === first.length) this.held.shift();
-      else this.held[0] = first.subarray(part.length);
+      if (part.length === first.length) this.chunks.shift();
+      else this.chunks[0] = first.subarray(part.length);
     }
-    this.length -= count;
+    this.buffered -= count;
     return out;
   }
 
@@ -56,13 +56,13 @@ export class ByteReader {
   }
 }
 
-/** What zlib compressed. */
+/** Decompressed bytes of zlib data. */
 export async function inflate(bytes: Bytes): Promise<ArrayBuffer> {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return await new Response(stream).arrayBuffer();
 }
 
-/** A file's header, and its arrays one after the other. */
+/** The header of a file, and its arrays in order. */
 export class PageFile<Header> {
   private next = 0;
 
@@ -72,7 +72,7 @@ export class PageFile<Header> {
     private readonly reader: ByteReader,
   ) {}
 
-  /** Reads the header of a file of a kind (8 letters) and version; throws where it is another. */
+  /** Reads the header of a file; throws for another magic (8 letters) or version. */
   static async open<Header>(reader: ByteReader, magic: string, version: number): Promise<PageFile<Header>> {
     const start = await reader.take(16);
     const view = new DataView(start.buffer);
@@ -86,7 +86,7 @@ export class PageFile<Header> {
     return new PageFile(header, header.arrays, reader);
   }
 
-  /** Bytes of the arrays that have not been read. */
+  /** Bytes of the unread arrays. */
   get left(): number {
     return this.entries.slice(this.next).reduce((sum, entry) => sum + entry.bytes, 0);
   }

@@ -1,4 +1,7 @@
-/** Progressive drawing of a still frame: bands of rows that leave the page responsive, restarted by every change. */
+/**
+ * Progressive drawing of a still frame: bands of rows that leave the page responsive, restarted by every
+ * change.
+ */
 
 /** Milliseconds after the last change until the frame counts as still. */
 export const SETTLE_MS = 60;
@@ -17,7 +20,10 @@ export class ProgressiveStill {
   private nextRow = 0;
   private complete = false;
 
-  /** Restarts the frame after a change at time `now` (ms); `complete` if the change was drawn as a complete frame. */
+  /**
+   * Restarts the frame after a change at time `now` (ms); `complete` if the change was drawn as a complete
+   * frame.
+   */
   restart(now: number, complete: boolean): void {
     this.changedAt = now;
     this.nextRow = 0;
@@ -29,7 +35,10 @@ export class ProgressiveStill {
     return this.complete;
   }
 
-  /** The band to draw now, at most `maxRows` rows; null if the frame is complete or has changed less than `settleMs` ago. */
+  /**
+   * The band to draw now, at most `maxRows` rows; null if the frame is complete or has changed less than
+   * `settleMs` ago.
+   */
   nextBand(now: number, height: number, maxRows: number, settleMs = SETTLE_MS): Band | null {
     if (this.complete || now - this.changedAt < settleMs) return null;
     return { first: this.nextRow, count: Math.min(maxRows, height - this.nextRow) };

@@ -9,7 +9,10 @@ const MAX_SLOWDOWN = 1.25;
 /** Milliseconds in which the page may draw a complete frame, whatever the server takes. */
 export const COMPLETE_FRAME_MS = 200;
 
-/** Factor by which the limit is relaxed while the page draws complete frames, so that the choice does not alternate. */
+/**
+ * Factor by which the limit is relaxed while the page draws complete frames, so that the choice does not
+ * alternate.
+ */
 const HYSTERESIS = 1.5;
 
 /** Weight of the newest measurement in a running mean. */
@@ -29,7 +32,10 @@ export class RenderLocation {
     this.pageCost = smooth(this.pageCost, milliseconds / Math.max(1, pixels));
   }
 
-  /** Records a frame of the server. Moving frames are cheaper per pixel: from the first one on, only they count. */
+  /**
+   * Records a frame of the server. Moving frames are cheaper per pixel: from the first one on, only they
+   * count.
+   */
   recordServer(pixels: number, milliseconds: number, moving: boolean): void {
     if (this.measuredMoving && !moving) return;
     const before = moving && !this.measuredMoving ? null : this.serverCost;
@@ -44,7 +50,10 @@ export class RenderLocation {
     return pageCost > MAX_SLOWDOWN * serverCost;
   }
 
-  /** Whether the page draws complete frames of so many pixels: within COMPLETE_FRAME_MS, or faster than the server. */
+  /**
+   * Whether the page draws complete frames of so many pixels: within COMPLETE_FRAME_MS, or faster than the
+   * server.
+   */
   chooseComplete(pixels: number): boolean {
     const { pageCost, serverCost } = this;
     if (pageCost === null) return false;
@@ -69,7 +78,10 @@ function smooth(before: number | null, now: number): number {
   return before === null ? now : before + SMOOTHING * (now - before);
 }
 
-/** Bytes of GPU memory that a scene may take on a device with so many GiB, where the browser states the number. */
+/**
+ * Bytes of GPU memory that a scene may take on a device with so many GiB, where the browser states the
+ * number.
+ */
 export function memoryLimit(deviceMemory: number | undefined): number {
   return Math.min(768, Math.max(96, (deviceMemory ?? 8) * 128)) * 2 ** 20;
 }

@@ -1,4 +1,7 @@
-/** Interface of a WebGL2 renderer that draws a scene and its edits: `FieldRenderer` and `SplatRenderer` implement it. */
+/**
+ * Interface of a WebGL2 renderer that draws a scene and its edits: `FieldRenderer` and `SplatRenderer`
+ * implement it.
+ */
 import type { Vec3 } from "./level";
 import type { PinholeCamera } from "./march_uniforms";
 import type { Bytes, OnArrival } from "./page_file";

@@ -1,33 +1,33 @@
-/** What a picture is drawn into: colour, depth as the bits of floats, and normals; formats that every WebGL2 draws to. */
+/** Render targets: color, depth as float bits, and normals, in formats that every WebGL2 device draws to. */
 
 type GL = WebGL2RenderingContext;
 
-/** A picture read back, top row first. */
-export interface Reading {
+/** An image read back from the GPU, top row first. */
+export interface RenderedImage {
   width: number;
   height: number;
-  /** [h, w, 4]: colour over the background, and opacity. */
+  /** [h, w, 4]: color over the background, and opacity. */
   rgba: Uint8Array;
-  /** [h, w]: distances along the rays, infinite where nothing is. */
+  /** [h, w]: distances along the rays; infinite for rays that hit nothing. */
   depth: Float32Array;
-  /** [h, w, 4]: 127.5 (1 + normal), and opacity; null unless wanted. */
+  /** [h, w, 4]: 127.5 (1 + normal), and opacity; null unless requested. */
   normals: Uint8Array | null;
 }
 
-export class Targets {
+export class RenderTargets {
   width = 1;
   height = 1;
-  private textures: { colour: WebGLTexture; depth: WebGLTexture; normals: WebGLTexture | null } | null = null;
+  private textures: { color: WebGLTexture; depth: WebGLTexture; normals: WebGLTexture | null } | null = null;
   private framebuffer: WebGLFramebuffer | null = null;
 
   constructor(private readonly gl: GL) {}
 
-  /** Colour over the background [RGBA8]; null before the first picture. */
-  get colour(): WebGLTexture | null {
-    return this.textures?.colour ?? null;
+  /** Color over the background [RGBA8]; null before the first image. */
+  get color(): WebGLTexture | null {
+    return this.textures?.color ?? null;
   }
 
-  /** 0.5 + 0.5 normal [RGBA8]; null unless the last picture had them. */
+  /** 0.5 + 0.5 normal [RGBA8]; null unless the last image has normals. */
   get normals(): WebGLTexture | null {
     return this.textures?.normals ?? null;
   }
@@ -44,20 +44,20 @@ export class Targets {
     this.height = height;
   }
 
-  /** Makes the targets if they are not there, and draws into them from now on. */
+  /** Creates missing targets and binds them for drawing. */
   bind(normals: boolean): void {
     const { gl } = this;
     if (this.textures && normals && !this.textures.normals) this.dispose();
     if (!this.textures) {
       this.textures = {
-        colour: this.texture(gl.RGBA8, gl.LINEAR),
+        color: this.texture(gl.RGBA8, gl.LINEAR),
         depth: this.texture(gl.R32UI, gl.NEAREST),
         normals: normals ? this.texture(gl.RGBA8, gl.NEAREST) : null,
       };
       this.framebuffer = gl.createFramebuffer();
       gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
-      const { colour, depth, normals: third } = this.textures;
-      for (const [n, texture] of [colour, depth, third].entries())
+      const { color: color, depth, normals: third } = this.textures;
+      for (const [n, texture] of [color, depth, third].entries())
         if (texture)
           gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + n, gl.TEXTURE_2D, texture, 0);
     }
@@ -66,7 +66,7 @@ export class Targets {
     gl.viewport(0, 0, this.width, this.height);
   }
 
-  read(normals: boolean): Reading {
+  read(normals: boolean): RenderedImage {
     const { gl, width, height } = this;
     const rgba = new Uint8Array(4 * width * height);
     const third = normals && this.textures?.normals ? new Uint8Array(4 * width * height) : null;
@@ -80,17 +80,17 @@ export class Targets {
       gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, third);
     }
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    const depth = flipped(this.readDepth(), width);
+    const depth = flipRows(this.readDepth(), width);
     return {
       width,
       height,
-      rgba: flipped(rgba, 4 * width),
+      rgba: flipRows(rgba, 4 * width),
       depth,
-      normals: third && flipped(third, 4 * width),
+      normals: third && flipRows(third, 4 * width),
     };
   }
 
-  /** [h, w]: floats of the integer framebuffer that is bound, of its size, bottom row first. */
+  /** [h, w]: floats of the bound integer framebuffer, bottom row first. */
   readBits(width: number, height: number): Float32Array {
     const { gl } = this;
     const bits = new Uint32Array(width * height);
@@ -106,7 +106,7 @@ export class Targets {
     return new Float32Array(bits.buffer);
   }
 
-  /** Waits until what was drawn is there. */
+  /** Waits until the GPU has drawn. */
   wait(): void {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
@@ -116,7 +116,7 @@ export class Targets {
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   }
 
-  /** Forgets what a lost context had. */
+  /** Drops the objects of a lost context. */
   forget(): void {
     this.textures = this.framebuffer = null;
   }
@@ -150,8 +150,8 @@ export class Targets {
   }
 }
 
-/** Rows of so many numbers, put into the opposite order in place. */
-function flipped<T extends Uint8Array | Float32Array>(values: T, row: number): T {
+/** Reverses the order of rows of `row` numbers, in place. */
+function flipRows<T extends Uint8Array | Float32Array>(values: T, row: number): T {
   const rows = values.length / row;
   for (let y = 0; y < rows >> 1; y++) {
     const [low, high] = [y * row, (rows - 1 - y) * row];

@@ -1,15 +1,18 @@
-/** What was drawn, as the editor's views show it (as `render_worker.encoding` does), and its distances read back. */
-import { programOf } from "./gl";
+/**
+ * Passes after rendering: the editor's views, equal to `render_worker.encoding`, and the readback of
+ * distances.
+ */
+import { createProgram } from "./gl";
 import type { Program } from "./gl";
-import { WHOLE } from "./present";
-import type { Targets } from "./targets";
+import { FULL_SCREEN_TRIANGLE } from "./present";
+import type { RenderTargets } from "./targets";
 
 type GL = WebGL2RenderingContext;
 
 export const VIEWS = ["colour", "depth", "opacity", "normals"] as const;
 export type View = (typeof VIEWS)[number];
 
-/** Distances of every so many pixels, top row first, infinite where the picture is half empty. */
+/** Subsampled distances of an image, top row first; infinite at an opacity up to .5. */
 export interface Distances {
   width: number;
   height: number;
@@ -25,7 +28,7 @@ uniform sampler2D normals;
 uniform vec2 size;
 uniform vec2 reach;
 uniform int view;
-out vec4 colour;
+out vec4 color;
 void main() {
   vec2 at = gl_FragCoord.xy / size;
   vec4 c = texture(picture, at);
@@ -38,7 +41,7 @@ void main() {
   } else if (view == ${VIEWS.indexOf("normals")}) {
     c.rgb = texture(normals, at).rgb * c.a;
   }
-  colour = vec4(c.rgb, 1.0);
+  color = vec4(c.rgb, 1.0);
 }`;
 
 const DISTANCES = `#version 300 es
@@ -55,9 +58,9 @@ void main() {
   bits = texelFetch(picture, at, 0).a > 0.5 ? texelFetch(depthBits, at, 0).r : 0x7f800000u;
 }`;
 
-export class Views {
+export class ViewPasses {
   private programs: { show: Program; distances: Program } | null = null;
-  private small: {
+  private distanceTarget: {
     texture: WebGLTexture;
     framebuffer: WebGLFramebuffer;
     width: number;
@@ -66,13 +69,13 @@ export class Views {
 
   constructor(
     private readonly gl: GL,
-    private readonly targets: Targets,
+    private readonly targets: RenderTargets,
   ) {}
 
-  /** Puts a view of what was drawn into the framebuffer that is bound; `reach` are the distances shown bright and dark. */
+  /** Draws a view of the image into the bound framebuffer; depths are shown from white to dark over `reach`. */
   show(view: View, reach: readonly [number, number], width: number, height: number): void {
     const { gl } = this;
-    const { program, uniform } = this.cached.show;
+    const { program, uniform } = this.compiledPrograms.show;
     gl.viewport(0, 0, width, height);
     gl.useProgram(program);
     this.bind(uniform);
@@ -85,13 +88,13 @@ export class Views {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  /** At most about `most` distances of what was drawn. */
+  /** At most about `most` distances of the drawn image. */
   distances(most: number): Distances {
     const { gl, targets } = this;
     const stride = Math.max(1, Math.ceil(Math.sqrt((targets.width * targets.height) / most)));
     const [width, height] = [Math.ceil(targets.width / stride), Math.ceil(targets.height / stride)];
-    this.bindSmall(width, height);
-    const { program, uniform } = this.cached.distances;
+    this.bindDistanceTarget(width, height);
+    const { program, uniform } = this.compiledPrograms.distances;
     gl.viewport(0, 0, width, height);
     gl.useProgram(program);
     this.bind(uniform);
@@ -102,23 +105,23 @@ export class Views {
     return { width, height, values: targets.readBits(width, height) };
   }
 
-  /** Forgets what a lost context had. */
+  /** Drops the objects of a lost context. */
   forget(): void {
-    this.programs = this.small = null;
+    this.programs = this.distanceTarget = null;
   }
 
   dispose(): void {
     const { gl } = this;
     for (const { program } of Object.values(this.programs ?? {})) gl.deleteProgram(program);
-    gl.deleteTexture(this.small?.texture ?? null);
-    gl.deleteFramebuffer(this.small?.framebuffer ?? null);
+    gl.deleteTexture(this.distanceTarget?.texture ?? null);
+    gl.deleteFramebuffer(this.distanceTarget?.framebuffer ?? null);
     this.forget();
   }
 
-  private get cached(): { show: Program; distances: Program } {
+  private get compiledPrograms(): { show: Program; distances: Program } {
     this.programs ??= {
-      show: programOf(this.gl, WHOLE, SHOW),
-      distances: programOf(this.gl, WHOLE, DISTANCES),
+      show: createProgram(this.gl, FULL_SCREEN_TRIANGLE, SHOW),
+      distances: createProgram(this.gl, FULL_SCREEN_TRIANGLE, DISTANCES),
     };
     return this.programs;
   }
@@ -126,27 +129,27 @@ export class Views {
   private bind(uniform: Program["uniform"]): void {
     const { gl, targets } = this;
     gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, targets.colour);
+    gl.bindTexture(gl.TEXTURE_2D, targets.color);
     gl.uniform1i(uniform("picture"), 0);
     gl.activeTexture(gl.TEXTURE1);
     gl.bindTexture(gl.TEXTURE_2D, targets.depth);
     gl.uniform1i(uniform("depthBits"), 1);
   }
 
-  private bindSmall(width: number, height: number): void {
+  private bindDistanceTarget(width: number, height: number): void {
     const { gl } = this;
-    if (this.small?.width !== width || this.small.height !== height) {
-      gl.deleteTexture(this.small?.texture ?? null);
-      gl.deleteFramebuffer(this.small?.framebuffer ?? null);
+    if (this.distanceTarget?.width !== width || this.distanceTarget.height !== height) {
+      gl.deleteTexture(this.distanceTarget?.texture ?? null);
+      gl.deleteFramebuffer(this.distanceTarget?.framebuffer ?? null);
       const texture = gl.createTexture();
       gl.bindTexture(gl.TEXTURE_2D, texture);
       gl.texStorage2D(gl.TEXTURE_2D, 1, gl.R32UI, width, height);
       const framebuffer = gl.createFramebuffer();
       gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
       gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
-      this.small = { texture, framebuffer, width, height };
+      this.distanceTarget = { texture, framebuffer, width, height };
     }
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.small.framebuffer);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.distanceTarget.framebuffer);
     gl.drawBuffers([gl.COLOR_ATTACHMENT0]);
   }
 }

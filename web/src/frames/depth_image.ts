@@ -1,7 +1,10 @@
 /** Distances of an image, assembled from the parts that arrive. */
 import type { PictureHeader } from "../net/protocol";
 
-/** Distance of a ray that hits nothing: beyond any scene, and finite, because shaders interpolate infinity badly. */
+/**
+ * Distance of a ray that hits nothing: beyond any scene, and finite, because shaders interpolate infinity
+ * badly.
+ */
 export const EMPTY_DISTANCE = 1e9;
 const EMPTY_CODE = 65535;
 

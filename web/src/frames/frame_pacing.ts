@@ -1,4 +1,7 @@
-/** Frame pacing: decoding of the server's frames in order, their presentation, and the request for the next ones. */
+/**
+ * Frame pacing: decoding of the server's frames in order, their presentation, and the request for the next
+ * ones.
+ */
 import type { Vector3 } from "three";
 import type { Figures, Store } from "../app/store";
 import type { PageMessage, PictureHeader } from "../net/protocol";
@@ -8,7 +11,10 @@ import { decode, unpack } from "./picture_message";
 import type { Pictures } from "./pictures";
 import { Throttle } from "./throttle";
 
-/** Milliseconds between updates of the figures while frames keep coming: a changed text costs a frame of its own. */
+/**
+ * Milliseconds between updates of the figures while frames keep coming: a changed text costs a frame of its
+ * own.
+ */
 const FIGURES_INTERVAL_MS = 300;
 
 /**
@@ -41,7 +47,7 @@ export interface PacerHost {
   isDragging(): boolean;
   /** Records the time that the server took for a frame. */
   recordServerFrame(header: PictureHeader): void;
-  /** Whether the page itself has drawn what a frame of the server shows. */
+  /** Whether the page itself has drawn the content of a frame of the server. */
   supersedes(header: PictureHeader): boolean;
   send(message: PageMessage): boolean;
   say(text: string, level: "warning"): void;
@@ -139,7 +145,10 @@ export class FramePacer {
     this.lastNews = performance.now();
   }
 
-  /** From inside the field, whose middle is no useful center of the orbit, the next frame's depth gives the center. */
+  /**
+   * From inside the field, whose middle is no useful center of the orbit, the next frame's depth gives the
+   * center.
+   */
   private awaitOrbitCenter(): void {
     const { store, viewport, camera } = this.host;
     const { hello } = store.now;

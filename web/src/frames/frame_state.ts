@@ -1,4 +1,7 @@
-/** State of a frame: the view and the edits that it shows, whether a redraw is due, and the header of the page's own frames. */
+/**
+ * State of a frame: the view and the edits that it shows, whether a redraw is due, and the header of the
+ * page's own frames.
+ */
 import type { Matrix4 } from "three";
 import type { Store } from "../app/store";
 import type { SceneDrawer } from "../field/scene_drawer";
@@ -51,7 +54,10 @@ export function isRefined(now: FrameState, before: FrameState): boolean {
   return before.edits.header.revision === now.edits.header.revision && hasSameView(now, before);
 }
 
-/** Whether the server's last frame shows the current view and edits; only a final frame counts if the page draws `all`. */
+/**
+ * Whether the server's last frame shows the current view and edits; only a final frame counts if the page
+ * draws `all`.
+ */
 export function isServed(
   last: PictureHeader | null,
   camera: CameraState,

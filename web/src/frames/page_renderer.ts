@@ -193,7 +193,9 @@ export class PageRenderer {
     viewport.invalidate();
   }
 
-  /** Loads the scene once the server's first complete frame is there, and announces each change of the state. */
+  /**
+   * Loads the scene once the server's first complete frame is there, and announces each change of the state.
+   */
   private follow(now: Editor): void {
     const { hello, state, connection, figures } = now;
     const connected = hello !== null && state !== null && connection === "open";
@@ -259,7 +261,10 @@ export class PageRenderer {
     if (this.drawsStills && !this.still.isComplete) host.viewport.invalidate();
   }
 
-  /** Whether complete frames are the page's own: always in the state `all`, and while the edits of a drag are shown. */
+  /**
+   * Whether complete frames are the page's own: always in the state `all`, and while the edits of a drag are
+   * shown.
+   */
   private get drawsStills(): boolean {
     return this.here === "all" || this.scene.edits?.header.final === false;
   }
@@ -297,7 +302,10 @@ export class PageRenderer {
     return !this.drawsStills && this.still.isComplete && this.host.frames.last?.picture === 0;
   }
 
-  /** Draws a band of the view, with splats `sorted` for it or as they are; false where there is nothing to draw. */
+  /**
+   * Draws a band of the view, with splats `sorted` for it or as they are; false where there is nothing to
+   * draw.
+   */
   private render(drawer: SceneDrawer, width: number, height: number, rows: Band, sorted: boolean): boolean {
     const { view, before, split } = this.host.store.now;
     const { viewport } = this.host;
@@ -344,7 +352,9 @@ export class PageRenderer {
     host.frames.add(this.header(width, height), scene.edits?.received ?? 0, scene.edits?.decoded ?? 0);
   }
 
-  /** Takes note of the time of a frame or band, and leaves rendering to the server where the page is too slow. */
+  /**
+   * Takes note of the time of a frame or band, and leaves rendering to the server where the page is too slow.
+   */
   private recordFrame(pixels: number, milliseconds: number, isFullSize: boolean): void {
     this.resolution.record(pixels, milliseconds);
     this.location.recordPage(pixels, milliseconds);

@@ -56,7 +56,10 @@ export class PageScene {
     return this.name !== null;
   }
 
-  /** Loads the field of a name, unless it is the current one: a reconnected page, with another number, still has it. */
+  /**
+   * Loads the field of a name, unless it is the current one: a reconnected page, with another number, still
+   * has it.
+   */
   load(name: string, page: number): void {
     if (name === this.name && (this.failedPage === null || this.failedPage === page)) return;
     this.clear();
@@ -64,7 +67,10 @@ export class PageScene {
     void this.fetch(name, page);
   }
 
-  /** Decodes and applies edits in the order of their arrival; calls `done` with null, or with the reason of a failure. */
+  /**
+   * Decodes and applies edits in the order of their arrival; calls `done` with null, or with the reason of a
+   * failure.
+   */
   take(header: EditsHeader, file: ArrayBuffer, done: (why: string | null) => void): void {
     const received = performance.now();
     const { name } = this;

@@ -47,8 +47,8 @@ const PART_FRAGMENT = `
 uniform sampler2D picture;
 uniform bool upright;
 in vec2 at;
-out vec4 colour;
-void main() { colour = vec4(texture(picture, upright ? at : vec2(at.x, 1.0 - at.y)).rgb, 1.0); }`;
+out vec4 color;
+void main() { color = vec4(texture(picture, upright ? at : vec2(at.x, 1.0 - at.y)).rgb, 1.0); }`;
 const SURFACE_VERTEX = `
 uniform sampler2D depthMap;
 uniform mat4 toWorld;
@@ -70,8 +70,8 @@ void main() {
 const SURFACE_FRAGMENT = `
 uniform sampler2D picture;
 in vec2 at;
-out vec4 colour;
-void main() { colour = vec4(texture(picture, at).rgb, 1.0); }`;
+out vec4 color;
+void main() { color = vec4(texture(picture, at).rgb, 1.0); }`;
 
 export class Pictures {
   readonly depth = new DepthImage();

@@ -34,7 +34,10 @@ export interface RenderFacts {
 
 export const IDLE: RenderState = { name: "idle" };
 
-/** The state that follows from the facts; `closed` is final, and `refused` lasts as long as `pictured` is the same. */
+/**
+ * The state that follows from the facts; `closed` is final, and `refused` lasts as long as `pictured` is the
+ * same.
+ */
 export function nextState(state: RenderState, facts: RenderFacts): RenderState {
   if (state.name === "closed") return state;
   if (state.name === "refused" && (!facts.connected || facts.pictured === state.pictured)) return state;

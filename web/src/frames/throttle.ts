@@ -8,7 +8,9 @@ export class Throttle<T> {
     private readonly forward: (value: T) => void,
   ) {}
 
-  /** Forwards a value now if the interval is over or `atOnce`; else at its end, unless a newer value arrives. */
+  /**
+   * Forwards a value now if the interval is over or `atOnce`; else at its end, unless a newer value arrives.
+   */
   put(value: T, atOnce = false): void {
     clearTimeout(this.timer);
     const wait = atOnce ? 0 : this.lastTime + this.intervalMs - performance.now();

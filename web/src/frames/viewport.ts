@@ -58,7 +58,10 @@ export class Viewport {
   cameraChanges: (() => void)[] = [];
   /** Called when the user turns the view or chooses another one. */
   userTurns: (() => void)[] = [];
-  /** Called when the orbit's center is only a guess: the point of the camera's axis closest to the scene's center. */
+  /**
+   * Called when the orbit's center is only a guess: the point of the camera's axis closest to the scene's
+   * center.
+   */
   orbitGuessed: (() => void)[] = [];
   private sceneCenter: Vec3 = [0, 0, 0];
   private scheduled = false;
@@ -106,7 +109,10 @@ export class Viewport {
     });
   }
 
-  /** Looks from a camera-to-world matrix, row by row, and orbits around the point of its axis closest to `around`. */
+  /**
+   * Looks from a camera-to-world matrix, row by row, and orbits around the point of its axis closest to
+   * `around`.
+   */
   lookFrom(c2w: readonly number[], fov_y_deg: number, up: Vec3, around: Vec3): void {
     this.notifyUserTurn();
     const { camera } = this;
@@ -146,12 +152,12 @@ export class Viewport {
   }
 
   /** Centers the orbit on a sphere and moves the camera so that the sphere fills most of the view. */
-  focus(centre: Vec3, radius: number): void {
+  focus(center: Vec3, radius: number): void {
     if (this.orbit === null) return;
     this.notifyUserTurn();
     const away = this.camera.position.clone().sub(this.orbit.target).normalize();
     const narrow = Math.min(1, this.camera.aspect) * Math.tan(MathUtils.degToRad(this.camera.fov / 2));
-    this.orbit.target.set(...centre);
+    this.orbit.target.set(...center);
     this.camera.position.copy(this.orbit.target).addScaledVector(away, (1.6 * radius) / narrow);
     this.orbit.update();
     this.updateCamera();

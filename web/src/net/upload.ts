@@ -17,7 +17,9 @@ export function uploadAddress(page: Location, name: string): string {
   return address.href;
 }
 
-/** The members of an XMLHttpRequest that are used; tests substitute them. `fetch` reports no upload progress. */
+/**
+ * The members of an XMLHttpRequest that are used; tests substitute them. `fetch` reports no upload progress.
+ */
 export type Request = Pick<
   XMLHttpRequest,
   "open" | "send" | "status" | "responseText" | "onload" | "onerror"
@@ -25,7 +27,10 @@ export type Request = Pick<
   upload: Pick<XMLHttpRequestUpload, "onprogress">;
 };
 
-/** Sends a file; null once the server has opened it, else the reason of the failure. `progress` gets the sent share. */
+/**
+ * Sends a file; null once the server has opened it, else the reason of the failure. `progress` gets the sent
+ * share.
+ */
 export function uploadFile(
   request: Request,
   file: File,

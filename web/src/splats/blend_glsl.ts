@@ -1,18 +1,18 @@
-import { defines } from "../field/gl";
+import { defineNumbers } from "../field/gl";
 import { SPLAT_CONSTANTS } from "../field/layout";
-import { WIDTH } from "./project_glsl";
+import { TEXTURE_WIDTH } from "./project_glsl";
 
 /**
- * Projected splats drawn over each other, far ones first, with the rule of `rendering.splats.kernels.blending`: alpha =
- * o exp(-q / 2), at most ALPHA_MAX, nothing below ALPHA_MIN. The kernel ends a tile where less than a thousandth of the
- * light comes through; here all splats are drawn.
+ * Shaders that blend projected splats back to front by the rule of `rendering.splats.kernels.blending`: alpha =
+ * o exp(-q / 2), at most ALPHA_MAX, and 0 below ALPHA_MIN. The kernel ends a tile at a transmittance below a thousandth;
+ * here all splats are drawn.
  *
  * A quad is the parallelogram |x + k y| <= sqrt(reach / A), |y| <= sqrt(reach / D) around the ellipse q = reach at which
  * alpha is ALPHA_MIN.
  */
-const CONSTANTS = defines(SPLAT_CONSTANTS);
+const CONSTANTS = defineNumbers(SPLAT_CONSTANTS);
 
-export const QUADS = `#version 300 es
+export const QUAD_VERTEX_SHADER = `#version 300 es
 ${CONSTANTS}
 precision highp float;
 precision highp int;
@@ -21,7 +21,7 @@ uniform usampler2D places, shapes, tints;
 uniform vec2 size;
 flat out vec4 where;
 flat out vec4 how;
-flat out vec4 colour;
+flat out vec4 color;
 #ifdef NORMALS
 uniform usampler2D normals;
 flat out vec3 axis;
@@ -29,11 +29,11 @@ flat out vec3 axis;
 void main() {
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   int splat = gl_VertexID / 6, side = gl_VertexID - 6 * splat;
-  ivec2 here = ivec2(splat % ${WIDTH}, splat / ${WIDTH});
+  ivec2 here = ivec2(splat % ${TEXTURE_WIDTH}, splat / ${TEXTURE_WIDTH});
   how = uintBitsToFloat(texelFetch(shapes, here, 0));
   if (how.y <= 0.0) return;
   where = uintBitsToFloat(texelFetch(places, here, 0));
-  colour = uintBitsToFloat(texelFetch(tints, here, 0));
+  color = uintBitsToFloat(texelFetch(tints, here, 0));
 #ifdef NORMALS
   axis = uintBitsToFloat(texelFetch(normals, here, 0)).xyz;
 #endif
@@ -46,15 +46,15 @@ void main() {
   gl_Position = vec4(2.0 * at.x / size.x - 1.0, 1.0 - 2.0 * at.y / size.y, 0.0, 1.0);
 }`;
 
-export const SPLAT = `#version 300 es
+export const SPLAT_FRAGMENT_SHADER = `#version 300 es
 ${CONSTANTS}
 precision highp float;
 flat in vec4 where;
 flat in vec4 how;
-flat in vec4 colour;
+flat in vec4 color;
 uniform vec2 size;
 uniform float unit;                 // of distances
-layout(location = 0) out vec4 outColour;
+layout(location = 0) out vec4 outColor;
 layout(location = 1) out vec4 outDepth;
 #ifdef NORMALS
 flat in vec3 axis;
@@ -66,21 +66,21 @@ void main() {
   float q = where.z * l * l + how.x * d.y * d.y;
   float a = min(how.y * exp(-0.5 * q), ALPHA_MAX);
   if (a < ALPHA_MIN) discard;
-  outColour = vec4(a * colour.rgb, a);
-  outDepth = vec4(a * unit * (how.z + how.w * d.x + colour.w * d.y), 0.0, 0.0, a);
+  outColor = vec4(a * color.rgb, a);
+  outDepth = vec4(a * unit * (how.z + how.w * d.x + color.w * d.y), 0.0, 0.0, a);
 #ifdef NORMALS
   outNormal = vec4(a * (0.5 + 0.5 * axis), a);
 #endif
 }`;
 
-/** What was gathered becomes the picture: over the background, depth as bits, normals of 8 bits. */
-export const RESOLVE = `#version 300 es
+/** Final pass: colors over the background, depth as float bits, normals of 8 bits. */
+export const RESOLVE_SHADER = `#version 300 es
 precision highp float;
 precision highp int;
 uniform sampler2D gathered, distances;
 uniform vec3 background;
 uniform float unit;
-layout(location = 0) out vec4 outColour;
+layout(location = 0) out vec4 outColor;
 layout(location = 1) out uint outDepth;
 #ifdef NORMALS
 uniform sampler2D axes;
@@ -90,7 +90,7 @@ vec4 eightBits(vec4 v) { return (floor(255.0 * clamp(v, 0.0, 1.0) + 0.5) + 0.25)
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   vec4 sum = texelFetch(gathered, at, 0);
-  outColour = eightBits(vec4(sum.rgb + (1.0 - sum.a) * background, sum.a));
+  outColor = eightBits(vec4(sum.rgb + (1.0 - sum.a) * background, sum.a));
   float distance = texelFetch(distances, at, 0).r / unit;
   outDepth = floatBitsToUint(sum.a > 1e-6 ? distance / sum.a : intBitsToFloat(0x7f800000));
 #ifdef NORMALS
@@ -101,7 +101,7 @@ void main() {
 #endif
 }`;
 
-/** A shader's source with these definitions after its first line. */
+/** The source of a shader with definitions after its first line. */
 export function withDefines(source: string, defines: readonly string[]): string {
   const end = source.indexOf("\n") + 1;
   return source.slice(0, end) + defines.map((name) => `#define ${name}\n`).join("") + source.slice(end);

@@ -1,37 +1,37 @@
 /**
- * What splats are blended into: colour, distances and normals, each times alpha. Half floats where the GPU draws to
- * them, distances in floats where it blends those; else 8 bits, in which faint splats and distances are rough.
+ * Targets of blending: color, distance and normal, each times alpha. Formats are float16, or float32 for distances, as far
+ * as the GPU can blend them; else 8 bits, in which faint splats and distances are coarse.
  */
 type GL = WebGL2RenderingContext;
 
-export interface Formats {
-  colour: number;
+export interface BlendFormats {
+  color: number;
   distance: number;
-  /** Whether distances must be in [0, 1]. */
+  /** Whether distances must be scaled to [0, 1]. */
   isByte: boolean;
 }
 
-export function formatsOf(gl: GL): Formats {
+export function chooseFormats(gl: GL): BlendFormats {
   const floats = gl.getExtension("EXT_color_buffer_float");
   if (floats && gl.getExtension("EXT_float_blend"))
-    return { colour: gl.RGBA16F, distance: gl.R32F, isByte: false };
+    return { color: gl.RGBA16F, distance: gl.R32F, isByte: false };
   if (floats ?? gl.getExtension("EXT_color_buffer_half_float"))
-    return { colour: gl.RGBA16F, distance: gl.RGBA16F, isByte: false };
-  return { colour: gl.RGBA8, distance: gl.RGBA8, isByte: true };
+    return { color: gl.RGBA16F, distance: gl.RGBA16F, isByte: false };
+  return { color: gl.RGBA8, distance: gl.RGBA8, isByte: true };
 }
 
-export class Gathering {
-  textures: { colour: WebGLTexture; distance: WebGLTexture; normal: WebGLTexture | null } | null = null;
+export class BlendTarget {
+  textures: { color: WebGLTexture; distance: WebGLTexture; normal: WebGLTexture | null } | null = null;
   private framebuffer: WebGLFramebuffer | null = null;
   private width = 0;
   private height = 0;
 
   constructor(
     private readonly gl: GL,
-    readonly formats: Formats,
+    readonly formats: BlendFormats,
   ) {}
 
-  /** Empties the targets, made where they are not there or of another size, and draws into them from now on. */
+  /** Binds the targets for drawing and clears them, created or resized if necessary. */
   begin(width: number, height: number, normals: boolean): void {
     const { gl, formats } = this;
     if (
@@ -43,14 +43,14 @@ export class Gathering {
       this.width = width;
       this.height = height;
       this.textures = {
-        colour: this.texture(formats.colour),
+        color: this.texture(formats.color),
         distance: this.texture(formats.distance),
-        normal: normals ? this.texture(formats.colour) : null,
+        normal: normals ? this.texture(formats.color) : null,
       };
       this.framebuffer = gl.createFramebuffer();
       gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
-      const { colour, distance, normal } = this.textures;
-      for (const [n, texture] of [colour, distance, normal].entries())
+      const { color, distance, normal } = this.textures;
+      for (const [n, texture] of [color, distance, normal].entries())
         if (texture)
           gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + n, gl.TEXTURE_2D, texture, 0);
     }
@@ -60,7 +60,7 @@ export class Gathering {
     for (let n = 0; n < (normals ? 3 : 2); n++) gl.clearBufferfv(gl.COLOR, n, [0, 0, 0, 0]);
   }
 
-  /** Forgets what a lost context had. */
+  /** Drops the objects of a lost context. */
   forget(): void {
     this.textures = this.framebuffer = null;
   }

@@ -1,16 +1,16 @@
-/** Splats from far to near: a radix sort of their depths, on the page or in a worker. */
+/** Depth order of splats, far to near, by a radix sort; runs in the page or in a worker. */
 
-/** Which splats there are: those of the field that are not hidden, and changed ones, numbered from `count` on. */
+/** The drawn splats: those of the field that are not hidden, and changed ones, numbered from `count` on. */
 export interface SplatSet {
   /** [count, 3] */
   means: Float32Array;
-  /** [count], or null where none is hidden. */
+  /** [count], 1 for a hidden splat; null if none is hidden. */
   hidden: Uint8Array | null;
-  /** [M, 3], NaN where one is not shown; null where none is changed. */
+  /** [M, 3], NaN for a splat that cannot be drawn yet; null if none is changed. */
   changed: Float32Array | null;
 }
 
-/** Depth is axis . mean + offset; what is nearer than `near`, which is above 0, is not drawn. */
+/** Depth function axis . mean + offset; splats nearer than `near` > 0 are not drawn. */
 export interface Depths {
   axis: readonly [number, number, number];
   offset: number;
@@ -19,7 +19,7 @@ export interface Depths {
 
 const RADIX = 1 << 16;
 
-/** Numbers of the splats with a depth of at least `near`, from far to near; of equal depths, higher numbers first. */
+/** Numbers of the splats at a depth of at least `near`, far to near; higher numbers first at equal depths. */
 export function depthOrder(set: SplatSet, depths: Depths): Uint32Array<ArrayBuffer> {
   const { means, hidden, changed } = set;
   const [x, y, z] = depths.axis;
@@ -46,7 +46,7 @@ export function depthOrder(set: SplatSet, depths: Depths): Uint32Array<ArrayBuff
       numbers[count++] = n;
     }
   }
-  // Floats above 0 are in the order of their bits: first by the low half of them, then by the high one, far ones first.
+  // Positive floats are in the order of their bits: sorted by the low half first, then by the high half, descending.
   const places = new Uint32Array(RADIX);
   const between = new Uint32Array(count);
   const order = new Uint32Array(count);

@@ -7,7 +7,7 @@ import { SplatRenderer } from "./splat_renderer";
 
 export type SceneKind = "voxels" | "splats";
 
-/** A scene file whose first bytes have been looked at: its kind, and all of its bytes. */
+/** A scene file: the kind, read from the first bytes, and all bytes. */
 export interface SceneFile {
   kind: SceneKind;
   source: ReadableStream<Bytes>;
@@ -25,7 +25,9 @@ export function readMagic(bytes: Bytes): string {
   return String.fromCharCode(...bytes.subarray(0, MAGIC_BYTES));
 }
 
-/** The kind of a scene file; every file that is not of splats counts as voxels, whose reader checks the magic. */
+/**
+ * The kind of a scene file; every file that is not of splats counts as voxels, whose reader checks the magic.
+ */
 export async function identifyScene(stream: ReadableStream<Bytes>): Promise<SceneFile> {
   const reader = stream.getReader();
   const chunks: Bytes[] = [];

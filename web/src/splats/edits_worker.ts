@@ -1,8 +1,8 @@
-/** Unpacks the edits of many splats beside the page, which goes on drawing meanwhile. */
+/** Worker that decodes edits of many splats while the page goes on drawing. */
 import { readSplatEdits } from "./splat_edits";
 import type { SplatEdits } from "./splat_edits";
 
-/** A file, and where the answer is wanted. */
+/** A file, and the port for the answer. */
 export interface ToReader {
   file: ArrayBuffer;
   answer: MessagePort;

@@ -1,8 +1,8 @@
-/** Sorts splats beside the page, so that a view that is turned, or a drag of many of them, does not wait. */
+/** Worker that sorts splats, so that neither camera motion nor drags of many splats wait. */
 import { depthOrder } from "./depth_order";
 import type { Depths, SplatSet } from "./depth_order";
 
-/** Parts of a set that are others than before, and then what to sort it by. */
+/** The changed parts of a set, then the depth function to sort by. */
 export type ToSorter = Pick<SplatSet, "means"> | Pick<SplatSet, "hidden" | "changed"> | { sort: Depths };
 
 let set: SplatSet = { means: new Float32Array(0), hidden: null, changed: null };

@@ -1,20 +1,23 @@
 /**
- * Splats onto a picture, one texel each: `rendering.splats.kernels.projection.project` with the names it has there.
+ * Shader that projects splats, one texel each: `rendering.splats.kernels.projection.project`, with the names of the kernel.
  *
  * A covariance is F F^T: F = R diag(s) of the field's splats, the Cholesky factor of changed ones. With N = M F, M the
  * derivative of the pixel by the point, the projected covariance is N N^T, and its determinant the square of the cross
- * product of N's rows: no difference of large numbers.
+ * product of N's rows, which avoids differences of large numbers.
  */
-import { defines } from "../field/gl";
+import { defineNumbers } from "../field/gl";
 import { SPLAT_CONSTANTS } from "../field/layout";
 import { BASIS } from "../field/harmonics_glsl";
 import { harmonicWords } from "./splat_file";
 
-/** Texels along a row of the textures. */
-export const WIDTH = 2048;
+/** Number of texels in a row of the textures. */
+export const TEXTURE_WIDTH = 2048;
 
-/** Texels that are written of each splat, the bits of four floats each: place, shape, tint, and its normal if wanted. */
-export const OUTPUTS = 3;
+/**
+ * Number of texels per projected splat, each with the bits of four floats: place, shape and tint; the normal
+ * is extra.
+ */
+export const PROJECTED_TEXELS = 3;
 
 export interface ProjectVariant {
   degree: number;
@@ -24,25 +27,25 @@ export interface ProjectVariant {
 
 const HEAD = `
 uniform usampler2D order;       // numbers of splats, from far to near
-uniform uint count;             // of them
+uniform uint count;             // numbers in the order
 uniform usampler2D records, harmonics, changed;
-uniform uint own;               // splats of the field; numbers from it on are changed ones
-uniform vec3 eye;               // less the field's centre
+uniform uint own;               // splats of the field; higher numbers are changed splats
+uniform vec3 eye;               // relative to the field's center
 uniform mat3 W;                 // rows: x right, y down, z forward
-uniform vec2 focal, centre, size;
+uniform vec2 focal, center, size;
 uniform vec4 limits;            // of (x, y) / z: low, high of x, of y
-uniform float near, logLow, logStep, colourStep;
+uniform float near, logLow, logStep, colorStep;
 
 // Mean in pixels, x right and y down; A, k of the conic A (x + k y)^2 + D y^2.
 layout(location = 0) out uvec4 place;
 // D, opacity (0: not shown), distance, its slope along x.
 layout(location = 1) out uvec4 shape;
-// Colour, slope of the distance along y.
+// Color, slope of the distance along y.
 layout(location = 2) out uvec4 tint;
 
-${defines(SPLAT_CONSTANTS)}
+${defineNumbers(SPLAT_CONSTANTS)}
 
-uvec4 texel(usampler2D from, uint n) { return texelFetch(from, ivec2(n % ${WIDTH}u, n / ${WIDTH}u), 0); }
+uvec4 texel(usampler2D from, uint n) { return texelFetch(from, ivec2(n % ${TEXTURE_WIDTH}u, n / ${TEXTURE_WIDTH}u), 0); }
 
 // The quaternion (w, x, y, z as its y, z, w, x: xyz and w) of three numbers of 15 bits; see page_splats.encode_rotations.
 vec4 rotation(uvec2 words) {
@@ -75,7 +78,7 @@ void main() {
   normal = uvec4(0u);
 #endif
   ivec2 here = ivec2(gl_FragCoord.xy);
-  if (uint(here.y * ${WIDTH} + here.x) >= count) return;
+  if (uint(here.y * ${TEXTURE_WIDTH} + here.x) >= count) return;
   uint splat = texelFetch(order, here, 0).r;
   uint source = splat;
   vec3 mean;
@@ -119,7 +122,7 @@ void main() {
 #endif
   float reach = 2.0 * log(o / ALPHA_MIN);
   if (!(reach > 0.0)) return;
-  vec2 at = p.xy / p.z * focal + centre;
+  vec2 at = p.xy / p.z * focal + center;
   vec2 extent = sqrt(reach * (vec2(a, c) + BLUR));
   if (any(lessThanEqual(at + extent, vec2(0.0))) || any(greaterThanEqual(at - extent, size))) return;
   place = floatBitsToUint(vec4(at, (c + BLUR) / det, -b / (c + BLUR)));
@@ -134,12 +137,12 @@ void main() {
   normal = floatBitsToUint(vec4(dot(axis, d) > 0.0 ? -axis : axis, 0.0));
 #endif
   d = rotated(vec4(-turn.xyz, turn.w), d);
-  tint = floatBitsToUint(vec4(gain * max(colourOf(source, d), 0.0), slope.y));
+  tint = floatBitsToUint(vec4(gain * max(colorOf(source, d), 0.0), slope.y));
 }
 `;
 
-/** The axis of least variance of F F^T: powers of the adjugate of it, whose largest one it is. */
-const FLATTEST = `
+/** GLSL of the axis of least variance of F F^T, the dominant axis of its adjugate, by power iteration. */
+const NORMAL_SOURCE = `
 layout(location = 3) out uvec4 normal;
 vec3 flattest(mat3 F) {
   mat3 C = F * transpose(F);
@@ -154,16 +157,16 @@ vec3 flattest(mat3 F) {
 }
 `;
 
-/** colourOf(splat of the field, canonical unit direction), before the clamp. */
-function colours(degree: number): string {
+/** GLSL of colorOf(splat of the field, canonical unit direction), without the clamp. */
+function colorSource(degree: number): string {
   const texels = harmonicWords(degree) / 4;
   const terms = (degree + 1) ** 2;
   const lines = [
     ...(degree > 0 ? [`uniform float steps[${terms - 1}];`] : []),
-    "vec3 colourOf(uint splat, vec3 d) {",
+    "vec3 colorOf(uint splat, vec3 d) {",
     "  uvec2 last = texel(records, 2u * splat + 1u).zw;",
     "  uint both = texel(records, 2u * splat).w;",
-    `  vec3 rgb = 0.5 + ${BASIS[0]} * colourStep * (vec3(both & 65535u, both >> 16, last.y >> 16) - 32768.0);`,
+    `  vec3 rgb = 0.5 + ${BASIS[0]} * colorStep * (vec3(both & 65535u, both >> 16, last.y >> 16) - 32768.0);`,
     ...Array.from(
       { length: texels },
       (_, n) => `  uvec4 t${n} = texel(harmonics, ${texels}u * splat + ${n}u);`,
@@ -179,7 +182,7 @@ function colours(degree: number): string {
   return [...lines, "  return rgb;", "}"].join("\n");
 }
 
-export function projecting(variant: ProjectVariant): string {
+export function projectionShader(variant: ProjectVariant): string {
   return [
     "#version 300 es",
     "precision highp float;",
@@ -188,8 +191,8 @@ export function projecting(variant: ProjectVariant): string {
     ...(variant.antialiased ? ["#define ANTIALIASED"] : []),
     ...(variant.normals ? ["#define NORMALS"] : []),
     HEAD,
-    variant.normals ? FLATTEST : "",
-    colours(variant.degree),
+    variant.normals ? NORMAL_SOURCE : "",
+    colorSource(variant.degree),
     MAIN,
   ].join("\n");
 }

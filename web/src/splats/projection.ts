@@ -1,24 +1,24 @@
-/** Splats in an order, and as they are projected: textures that grow. */
-import { plainUnpacking, setFilter } from "../field/gl";
-import { OUTPUTS, WIDTH } from "./project_glsl";
+/** Textures, which grow on demand, of the order of splats and of the projected splats. */
+import { resetUnpacking, setFilter } from "../field/gl";
+import { PROJECTED_TEXELS, TEXTURE_WIDTH } from "./project_glsl";
 
 type GL = WebGL2RenderingContext;
 
-export class Projection {
+export class ProjectedTextures {
   /** Numbers of splats [R32UI]. */
   order: WebGLTexture | null = null;
-  /** What was written of them [RGBA32UI]. */
+  /** Texels of the projected splats [RGBA32UI]. */
   outputs: WebGLTexture[] = [];
   private framebuffer: WebGLFramebuffer | null = null;
   private rows = 0;
 
   constructor(private readonly gl: GL) {}
 
-  /** Makes room for so many splats, with normals or without; true where the order is to be put anew. */
+  /** Makes room for `count` splats, with or without normals; true if the order must be uploaded again. */
   reserve(count: number, normals: boolean): boolean {
     const { gl } = this;
-    const rows = Math.ceil(count / WIDTH);
-    const outputs = OUTPUTS + (normals ? 1 : 0);
+    const rows = Math.ceil(count / TEXTURE_WIDTH);
+    const outputs = PROJECTED_TEXELS + (normals ? 1 : 0);
     if (rows <= this.rows && outputs <= this.outputs.length) return false;
     const most = Math.max(outputs, this.outputs.length);
     this.rows = Math.max(rows, this.rows);
@@ -34,11 +34,11 @@ export class Projection {
 
   put(numbers: Uint32Array<ArrayBuffer>): void {
     const { gl } = this;
-    const whole = Math.floor(numbers.length / WIDTH);
-    const rest = numbers.length - whole * WIDTH;
-    plainUnpacking(gl);
+    const whole = Math.floor(numbers.length / TEXTURE_WIDTH);
+    const rest = numbers.length - whole * TEXTURE_WIDTH;
+    resetUnpacking(gl);
     gl.bindTexture(gl.TEXTURE_2D, this.order);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, whole, gl.RED_INTEGER, gl.UNSIGNED_INT, numbers);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, TEXTURE_WIDTH, whole, gl.RED_INTEGER, gl.UNSIGNED_INT, numbers);
     if (rest > 0)
       gl.texSubImage2D(
         gl.TEXTURE_2D,
@@ -50,17 +50,19 @@ export class Projection {
         gl.RED_INTEGER,
         gl.UNSIGNED_INT,
         numbers,
-        whole * WIDTH,
+        whole * TEXTURE_WIDTH,
       );
     gl.bindTexture(gl.TEXTURE_2D, null);
   }
 
-  /** What is drawn from now on is written of so many splats. */
+  /** Binds the textures as the target for `count` splats. */
   bind(count: number, normals: boolean): void {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
-    gl.drawBuffers(this.outputs.map((_, n) => (n < OUTPUTS || normals ? gl.COLOR_ATTACHMENT0 + n : gl.NONE)));
-    gl.viewport(0, 0, WIDTH, Math.ceil(count / WIDTH));
+    gl.drawBuffers(
+      this.outputs.map((_, n) => (n < PROJECTED_TEXELS || normals ? gl.COLOR_ATTACHMENT0 + n : gl.NONE)),
+    );
+    gl.viewport(0, 0, TEXTURE_WIDTH, Math.ceil(count / TEXTURE_WIDTH));
   }
 
   dispose(): void {
@@ -80,7 +82,7 @@ export class Projection {
     const { gl } = this;
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, format, WIDTH, this.rows);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, format, TEXTURE_WIDTH, this.rows);
     setFilter(gl, gl.TEXTURE_2D, gl.NEAREST);
     gl.bindTexture(gl.TEXTURE_2D, null);
     return texture;

@@ -1,7 +1,7 @@
-/** Shapes of splats from how files tell them (see `cagefield.pages.page_splats`). */
+/** Decoding of the shapes of splats in files (see `cagefield.pages.page_splats`). */
 
-/** The matrix, row by row, of three numbers as `page_splats.encode_rotations` writes them. */
-export function rotationOf(a: number, b: number, c: number): number[] {
+/** Rotation matrix, row by row, of three numbers of `page_splats.encode_rotations`. */
+export function decodeRotation(a: number, b: number, c: number): number[] {
   const left = (a >> 15) | ((b >> 15) << 1);
   const three = [a, b, c].map((code) => ((code & 32767) - 16384) / (16383 * Math.SQRT2));
   const most = Math.sqrt(Math.max(0, 1 - three[0] ** 2 - three[1] ** 2 - three[2] ** 2));
@@ -20,7 +20,7 @@ export function rotationOf(a: number, b: number, c: number): number[] {
 }
 
 /** Axes [M, 9], row by row, each column as long as the standard deviation along it: A of a covariance A A^T. */
-export function axesOf(
+export function decodeAxes(
   rotations: Uint16Array,
   scales: Uint16Array,
   [low, high]: [number, number],
@@ -28,7 +28,7 @@ export function axesOf(
   const count = rotations.length / 3;
   const out = new Float32Array(9 * count);
   for (let n = 0; n < count; n++) {
-    const rotation = rotationOf(rotations[n], rotations[count + n], rotations[2 * count + n]);
+    const rotation = decodeRotation(rotations[n], rotations[count + n], rotations[2 * count + n]);
     for (let k = 0; k < 3; k++) {
       const size = Math.exp(low + ((high - low) * scales[k * count + n]) / 65535);
       for (let i = 0; i < 3; i++) out[9 * n + 3 * i + k] = rotation[3 * i + k] * size;
@@ -38,7 +38,7 @@ export function axesOf(
 }
 
 /** Covariances A A^T [M, 6] (xx, xy, xz, yy, yz, zz) of matrices A [M, 9]. */
-export function covariancesOf(axes: Float32Array): Float32Array<ArrayBuffer> {
+export function covariancesFromAxes(axes: Float32Array): Float32Array<ArrayBuffer> {
   const out = new Float32Array((axes.length / 9) * 6);
   for (let n = 0, at = 0; n < axes.length; n += 9) {
     for (let i = 0; i < 3; i++)

@@ -1,14 +1,14 @@
-/** The order of a set of splats for the camera that was asked for last: at once of few, else from a worker. */
+/** Depth orders of sets of splats for the current camera: small sets at once, large ones in a worker. */
 import { depthOrder } from "./depth_order";
 import type { Depths, SplatSet } from "./depth_order";
 import type { ToSorter } from "./order_worker";
 import OrderWorker from "./order_worker?worker&inline";
 
-/** Splats that are sorted at once: a millisecond or two. */
-const FEW = 32_768;
+/** Number of splats that are sorted within one or two milliseconds. */
+const MAX_SYNCHRONOUS_SPLATS = 32_768;
 
 export interface Order {
-  /** Numbers from far to near. */
+  /** Numbers of the splats, far to near. */
   numbers: Uint32Array<ArrayBuffer>;
   set: SplatSet;
   depths: Depths;
@@ -17,42 +17,42 @@ export interface Order {
 interface Job {
   set: SplatSet;
   depths: Depths;
-  /** Called when a set's first order is there; null for another camera. */
+  /** Called when the first order of a prepared set is complete; null for a job of the current set. */
   prepared: (() => void) | null;
 }
 
 export class Sorter {
-  /** Called when an order has come from the worker. */
+  /** Called when the worker has returned an order. */
   onOrder: (() => void) | null = null;
-  /** Orders that were made on the page, which waited for them. */
+  /** Number of orders for which the page has waited. */
   sortedHere = 0;
   private order: Order | null = null;
-  /** The first order of a set that is yet to be asked for. */
-  private ready: Order | null = null;
+  /** The order of a prepared set that has not been drawn yet. */
+  private firstOrder: Order | null = null;
   private worker: Worker | null = null;
-  /** Whether there can be no worker: all is sorted at once. */
-  private alone = false;
+  /** Whether the page may have no worker, so that all sets are sorted at once. */
+  private hasNoWorker = false;
   /** The set that the worker has. */
-  private posted: SplatSet | null = null;
-  /** What the worker sorts now, and what it is to sort next: a set that is prepared goes first. */
+  private postedSet: SplatSet | null = null;
+  /** The job of the worker, and the next ones: a prepared set takes precedence. */
   private running: Job | null = null;
   private preparing: Job | null = null;
   private next: Job | null = null;
-  /** Whether an order has been made on the page since the worker began. */
+  /** Whether the page has sorted since the worker's job began, so that the job is obsolete. */
   private outdated = false;
 
   /**
-   * The order of a set that there is: of another camera where the worker has not answered yet, never of another set.
-   * With `now` it is of this camera.
+   * An order of the set, possibly for an earlier camera, if the worker has not answered yet. With `now` the order is for
+   * the given camera.
    */
-  of(set: SplatSet, depths: Depths, now: boolean): Order {
-    if (this.ready?.set === set) {
-      this.order = this.ready;
-      this.ready = null;
+  orderFor(set: SplatSet, depths: Depths, now: boolean): Order {
+    if (this.firstOrder?.set === set) {
+      this.order = this.firstOrder;
+      this.firstOrder = null;
     }
     const { order } = this;
     const known = order?.set === set ? order : null;
-    if (known !== null && same(known.depths, depths)) return known;
+    if (known !== null && haveSameDepths(known.depths, depths)) return known;
     if (known === null || now || this.isQuick(set)) {
       this.next = null;
       this.outdated = this.running !== null;
@@ -60,78 +60,85 @@ export class Sorter {
       return (this.order = { numbers: depthOrder(set, depths), set, depths });
     }
     const { running } = this;
-    const asked = running?.set === set && same(running.depths, depths);
+    const asked = running?.set === set && haveSameDepths(running.depths, depths);
     this.next = asked ? null : { set, depths, prepared: null };
-    this.goOn();
+    this.postNext();
     return known;
   }
 
-  /** Has the worker sort a set that is to be drawn next, so that `of` finds an order of it. */
+  /** Sorts a set in the worker before it is drawn, so that `orderFor` has an order at once. */
   prepare(set: SplatSet, depths: Depths): Promise<void> {
     if (this.isQuick(set)) return Promise.resolve();
     return new Promise((prepared) => {
       this.preparing?.prepared?.();
       this.preparing = { set, depths, prepared };
-      this.goOn();
+      this.postNext();
     });
   }
 
   dispose(): void {
     this.worker?.terminate();
     const waiting = [this.running, this.preparing];
-    this.worker = this.posted = this.running = this.preparing = this.next = this.ready = this.order = null;
+    this.worker =
+      this.postedSet =
+      this.running =
+      this.preparing =
+      this.next =
+      this.firstOrder =
+      this.order =
+        null;
     for (const job of waiting) job?.prepared?.();
   }
 
   private isQuick({ means, changed }: SplatSet): boolean {
-    return this.alone || means.length + (changed?.length ?? 0) <= 3 * FEW;
+    return this.hasNoWorker || means.length + (changed?.length ?? 0) <= 3 * MAX_SYNCHRONOUS_SPLATS;
   }
 
-  /** Gives the worker, if it waits, what is to be sorted next. */
-  private goOn(): void {
+  /** Posts the next job to an idle worker. */
+  private postNext(): void {
     const job = this.preparing ?? this.next;
     if (this.running !== null || job === null) return;
     if (job === this.preparing) this.preparing = null;
     else this.next = null;
     this.running = job;
-    this.worker ??= this.begun();
+    this.worker ??= this.startWorker();
     const { set, depths } = job;
     const post = (message: ToSorter): void => this.worker?.postMessage(message);
-    if (this.posted?.means !== set.means) post({ means: set.means });
-    if (this.posted !== set) post({ hidden: set.hidden, changed: set.changed });
-    this.posted = set;
+    if (this.postedSet?.means !== set.means) post({ means: set.means });
+    if (this.postedSet !== set) post({ hidden: set.hidden, changed: set.changed });
+    this.postedSet = set;
     post({ sort: depths });
   }
 
-  private begun(): Worker {
+  private startWorker(): Worker {
     const worker = new OrderWorker();
-    worker.onmessage = ({ data }: MessageEvent<Uint32Array<ArrayBuffer>>): void => this.answered(data);
+    worker.onmessage = ({ data }: MessageEvent<Uint32Array<ArrayBuffer>>): void => this.takeAnswer(data);
     worker.onerror = () => {
-      this.alone = true;
+      this.hasNoWorker = true;
       this.dispose();
       this.onOrder?.();
     };
     return worker;
   }
 
-  private answered(numbers: Uint32Array<ArrayBuffer>): void {
+  private takeAnswer(numbers: Uint32Array<ArrayBuffer>): void {
     const { running: job, outdated } = this;
     this.running = null;
     this.outdated = false;
     if (job === null) return;
     const found = { numbers, set: job.set, depths: job.depths };
     if (job.prepared !== null) {
-      this.ready = found;
+      this.firstOrder = found;
       job.prepared();
     } else if (this.order?.set === job.set && !outdated) {
       this.order = found;
       this.onOrder?.();
     }
-    this.goOn();
+    this.postNext();
   }
 }
 
-export function same(one: Depths, other: Depths): boolean {
+export function haveSameDepths(one: Depths, other: Depths): boolean {
   return (
     one.offset === other.offset &&
     one.near === other.near &&

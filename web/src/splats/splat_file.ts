@@ -1,4 +1,4 @@
-/** Splats as they come over the wire (see `cagefield.pages.page_splats`), packed as they lie on the GPU. */
+/** Files of splats (see `cagefield.pages.page_splats`), converted to the records of the GPU. */
 import type { Vec3 } from "../field/level";
 import { ByteReader, PageFile } from "../field/page_file";
 import type { Bytes, OnArrival } from "../field/page_file";
@@ -6,31 +6,33 @@ import type { Bytes, OnArrival } from "../field/page_file";
 export const MAGIC = "cagespla";
 const VERSION = 1;
 
-const CHUNK = 256;
+const CHUNK_SPLATS = 256;
 
-/** Words of 32 bits that a splat's record has: the mean's floats, first colours, rotation, opacity, scales. */
-export const RECORD = 8;
+/**
+ * Number of 32-bit words in a splat's record: the floats of the mean, base color, rotation, opacity, scales.
+ */
+export const RECORD_WORDS = 8;
 
 export interface SplatHeader {
   count: number;
   degree: number;
   antialiased: boolean;
   bounds: [Vec3, Vec3];
-  /** What means are less. */
+  /** The point to which means are relative. */
   centre: Vec3;
-  /** Depth from which splats are drawn. */
+  /** The smallest depth at which splats are drawn. */
   near: number;
   background: Vec3 | null;
-  /** Logarithms of scales from 0 to 65535. */
+  /** Logarithms of scales for the codes 0 and 65535. */
   log_scales: [number, number];
   colour_step: number;
-  /** Colour coefficient of one step of 8 bits, for those from degree 1 on. */
+  /** Color coefficient of one step of the 8-bit values, from degree 1 on. */
   steps: number[];
-  /** Splats with which each level ends. */
+  /** Number of splats up to the end of each level. */
   levels: number[];
 }
 
-/** Some of the splats: those from `first` on. */
+/** The splats of a level, numbered from `first` on. */
 export interface SplatLevel {
   header: SplatHeader;
   first: number;
@@ -44,12 +46,12 @@ export interface SplatLevel {
   harmonics: Uint32Array<ArrayBuffer>;
 }
 
-/** Words of a splat's coefficients from degree 1 on, whole texels of four. */
+/** Number of 32-bit words for a splat's coefficients from degree 1 on, padded to texels of four. */
 export function harmonicWords(degree: number): number {
   return 4 * Math.ceil((3 * ((degree + 1) ** 2 - 1)) / 16);
 }
 
-/** The levels of a file as they arrive; each adds its splats to those before. */
+/** The levels of a file in the order of their arrival; each adds splats to the earlier ones. */
 export async function* readSplatLevels(
   source: ReadableStream<Bytes> | ArrayBuffer,
   onHeader: (header: SplatHeader) => void,
@@ -66,13 +68,19 @@ export async function* readSplatLevels(
       const bytes = async (name: string): Promise<Uint8Array> =>
         (await file.read(`${number}.${name}`)) as Uint8Array;
       const chunks = (await file.read(`${number}.chunks`)) as Float32Array;
-      const means = meansOf(chunks, await bytes("means"), count);
+      const means = decodeMeans(chunks, await bytes("means"), count);
       const rotations = await bytes("rotations");
       const scales = await bytes("scales");
       const opacities = await bytes("opacities");
-      const colours = await bytes("colours");
-      const records = recordsOf(means, wholes(rotations), wholes(scales), wholes(opacities), wholes(colours));
-      const harmonics = harmonicsOf(await bytes("sh"), count, header.degree);
+      const colors = await bytes("colours");
+      const records = encodeRecords(
+        means,
+        joinHighLowBytes(rotations),
+        joinHighLowBytes(scales),
+        joinHighLowBytes(opacities),
+        joinHighLowBytes(colors),
+      );
+      const harmonics = packHarmonics(await bytes("sh"), count, header.degree);
       yield { header, first, count, last: number === header.levels.length - 1, means, records, harmonics };
       first = end;
     }
@@ -81,21 +89,25 @@ export async function* readSplatLevels(
   }
 }
 
-/** Numbers of 16 bits whose high bytes come first, then their low ones. */
-export function wholes(planes: Uint8Array): Uint16Array {
+/** 16-bit numbers from a plane of high bytes and a plane of low bytes. */
+export function joinHighLowBytes(planes: Uint8Array): Uint16Array {
   const count = planes.length / 2;
   const out = new Uint16Array(count);
   for (let n = 0; n < count; n++) out[n] = (planes[n] << 8) | planes[count + n];
   return out;
 }
 
-/** Means [count, 3] of chunks' bounds [C, 2, 3] and bytes [B, 3, count], high ones first. */
-export function meansOf(chunks: Float32Array, planes: Uint8Array, count: number): Float32Array<ArrayBuffer> {
+/** Means [count, 3] from the bounds [C, 2, 3] of chunks and bytes [B, 3, count], high bytes first. */
+export function decodeMeans(
+  chunks: Float32Array,
+  planes: Uint8Array,
+  count: number,
+): Float32Array<ArrayBuffer> {
   const bytes = planes.length / (3 * count);
   const most = 256 ** bytes - 1;
   const out = new Float32Array(3 * count);
   for (let n = 0; n < count; n++) {
-    const chunk = 6 * Math.floor(n / CHUNK);
+    const chunk = 6 * Math.floor(n / CHUNK_SPLATS);
     for (let axis = 0; axis < 3; axis++) {
       let whole = 0;
       for (let byte = 0; byte < bytes; byte++) whole = 256 * whole + planes[(3 * byte + axis) * count + n];
@@ -106,31 +118,31 @@ export function meansOf(chunks: Float32Array, planes: Uint8Array, count: number)
   return out;
 }
 
-function recordsOf(
+function encodeRecords(
   means: Float32Array<ArrayBuffer>,
   rotations: Uint16Array,
   scales: Uint16Array,
   opacities: Uint16Array,
-  colours: Uint16Array,
+  colors: Uint16Array,
 ): Uint32Array<ArrayBuffer> {
   const count = opacities.length;
   const bits = new Uint32Array(means.buffer);
-  const out = new Uint32Array(RECORD * count);
+  const out = new Uint32Array(RECORD_WORDS * count);
   for (let n = 0; n < count; n++) {
-    const at = RECORD * n;
+    const at = RECORD_WORDS * n;
     out[at] = bits[3 * n];
     out[at + 1] = bits[3 * n + 1];
     out[at + 2] = bits[3 * n + 2];
-    out[at + 3] = colours[n] | (colours[count + n] << 16);
+    out[at + 3] = colors[n] | (colors[count + n] << 16);
     out[at + 4] = rotations[n] | (rotations[count + n] << 16);
     out[at + 5] = rotations[2 * count + n] | (opacities[n] << 16);
     out[at + 6] = scales[n] | (scales[count + n] << 16);
-    out[at + 7] = scales[2 * count + n] | (colours[2 * count + n] << 16);
+    out[at + 7] = scales[2 * count + n] | (colors[2 * count + n] << 16);
   }
   return out;
 }
 
-function harmonicsOf(rows: Uint8Array, count: number, degree: number): Uint32Array<ArrayBuffer> {
+function packHarmonics(rows: Uint8Array, count: number, degree: number): Uint32Array<ArrayBuffer> {
   const stride = 4 * harmonicWords(degree);
   const out = new Uint8Array(stride * count);
   const terms = 3 * ((degree + 1) ** 2 - 1);

@@ -1,32 +1,35 @@
 /**
- * The passes of a picture of splats: each is projected once, into texels of a texture, in the order from far to near;
- * then each is a quad that is blended over what is there; then colours and distances are made of what was gathered.
+ * Render passes of splats: projection of each splat into texels, far to near; blending of a quad per splat; final colors
+ * and distances from the blended sums.
  */
-import { programOf } from "../field/gl";
+import { createProgram } from "../field/gl";
 import type { Program } from "../field/gl";
 import type { Vec3 } from "../field/level";
 import type { PinholeCamera } from "../field/march_uniforms";
-import { WHOLE } from "../field/present";
-import type { Targets } from "../field/targets";
-import { QUADS, RESOLVE, SPLAT, withDefines } from "./blend_glsl";
-import { Gathering } from "./blend_target";
-import type { Formats } from "./blend_target";
-import { projecting } from "./project_glsl";
-import { Projection } from "./projection";
+import { FULL_SCREEN_TRIANGLE } from "../field/present";
+import type { RenderTargets } from "../field/targets";
+import { QUAD_VERTEX_SHADER, RESOLVE_SHADER, SPLAT_FRAGMENT_SHADER, withDefines } from "./blend_glsl";
+import { BlendTarget } from "./blend_target";
+import type { BlendFormats } from "./blend_target";
+import { projectionShader } from "./project_glsl";
+import { ProjectedTextures } from "./projection";
 import type { Order } from "./sorter";
-import { eyeOf, farthest, nearestOf } from "./splat_camera";
+import { relativeEye, farDistance, nearDepth } from "./splat_camera";
 import type { SplatStore } from "./splat_store";
 import type { WordTexture } from "./splat_textures";
 
 type GL = WebGL2RenderingContext;
 
-/** How far outside the picture, in shares of its half-size, a splat's shape still follows where it is. */
-const OUTSIDE = 0.3;
+/**
+ * Margin around the image, as a share of its half-size, within which the shape of a splat follows its
+ * position.
+ */
+const SHAPE_MARGIN = 0.3;
 
-/** What a picture is drawn of. */
-export interface Drawing {
+/** Input of one image. */
+export interface SplatDraw {
   store: SplatStore;
-  /** Splats that edits changed. */
+  /** Records of the splats changed by edits. */
   changed: WordTexture | null;
   camera: PinholeCamera;
   near: number;
@@ -38,67 +41,67 @@ export interface Drawing {
 }
 
 export class SplatPasses {
-  /** Milliseconds that the last shader took, and how many were compiled. */
+  /** Milliseconds of the last compilation of a shader, and the number of compilations. */
   compileTime = 0;
   compiled = 0;
   private readonly programs = new Map<string, Program>();
-  private readonly gathering: Gathering;
-  private readonly projection: Projection;
+  private readonly blendTarget: BlendTarget;
+  private readonly projection: ProjectedTextures;
   private readonly vertices: WebGLVertexArrayObject;
-  /** The order whose numbers lie on the GPU. */
-  private ordered: Order | null = null;
+  /** The order that is on the GPU. */
+  private uploadedOrder: Order | null = null;
 
   constructor(
     private readonly gl: GL,
-    private readonly targets: Targets,
-    formats: Formats,
+    private readonly targets: RenderTargets,
+    formats: BlendFormats,
   ) {
-    this.gathering = new Gathering(gl, formats);
-    this.projection = new Projection(gl);
+    this.blendTarget = new BlendTarget(gl, formats);
+    this.projection = new ProjectedTextures(gl);
     this.vertices = gl.createVertexArray();
   }
 
   /** Draws into the targets. */
-  draw(drawing: Drawing): void {
-    const { gl, gathering } = this;
+  draw(drawing: SplatDraw): void {
+    const { gl, blendTarget: gathering } = this;
     const { store, camera, normals, rows, columns } = drawing;
     const count = this.project(drawing);
     gathering.begin(this.targets.width, this.targets.height, normals);
     gl.enable(gl.SCISSOR_TEST);
     gl.scissor(columns.first, rows.first, columns.count, rows.count);
-    const unit = gathering.formats.isByte ? 1 / farthest(store.header, camera) : 1;
+    const unit = gathering.formats.isByte ? 1 / farDistance(store.header, camera) : 1;
     if (count > 0) this.blend(count, normals, unit);
     this.resolve(normals, unit, drawing.background);
     gl.disable(gl.SCISSOR_TEST);
   }
 
-  /** For passes of others, which take their vertices from no buffer. */
+  /** Binds a vertex array without buffers, for other passes. */
   bindVertices(): void {
     this.gl.bindVertexArray(this.vertices);
   }
 
   dispose(): void {
     const { gl } = this;
-    this.ordered = null;
-    this.gathering.dispose();
+    this.uploadedOrder = null;
+    this.blendTarget.dispose();
     this.projection.dispose();
     for (const { program } of this.programs.values()) gl.deleteProgram(program);
     this.programs.clear();
     gl.deleteVertexArray(this.vertices);
   }
 
-  /** Projects splats in an order into the buffer of quads; how many there are. */
-  private project({ store, changed, camera, near, order, normals }: Drawing): number {
+  /** Projects the splats in their order; returns the number of quads. */
+  private project({ store, changed, camera, near, order, normals }: SplatDraw): number {
     const { gl } = this;
-    const { degree, antialiased, steps, log_scales: logs, colour_step: colourStep } = store.header;
+    const { degree, antialiased, steps, log_scales: logs, colour_step: colorStep } = store.header;
     const count = order.numbers.length;
     if (count === 0) return 0;
-    const { program, uniform } = this.cached(`project${degree}${antialiased}${normals}`, () => {
-      return programOf(gl, WHOLE, projecting({ degree, antialiased, normals }));
+    const { program, uniform } = this.programFor(`project${degree}${antialiased}${normals}`, () => {
+      return createProgram(gl, FULL_SCREEN_TRIANGLE, projectionShader({ degree, antialiased, normals }));
     });
     const { projection } = this;
-    if (projection.reserve(count, normals) || this.ordered !== order) projection.put(order.numbers);
-    this.ordered = order;
+    if (projection.reserve(count, normals) || this.uploadedOrder !== order) projection.put(order.numbers);
+    this.uploadedOrder = order;
     projection.bind(count, normals);
     gl.useProgram(program);
     this.bindVertices();
@@ -107,7 +110,7 @@ export class SplatPasses {
     gl.uniform1ui(uniform("own"), store.count);
     gl.uniform1f(uniform("logLow"), logs[0]);
     gl.uniform1f(uniform("logStep"), (logs[1] - logs[0]) / 65535);
-    gl.uniform1f(uniform("colourStep"), colourStep);
+    gl.uniform1f(uniform("colorStep"), colorStep);
     gl.uniform1ui(uniform("count"), count);
     this.bind(uniform, "order", projection.order, 0);
     this.bind(uniform, "records", store.records.texture, 1);
@@ -120,8 +123,12 @@ export class SplatPasses {
   private blend(count: number, normals: boolean, unit: number): void {
     const { gl } = this;
     const defines = normals ? ["NORMALS"] : [];
-    const { program, uniform } = this.cached(`blend${normals}`, () =>
-      programOf(gl, withDefines(QUADS, defines), withDefines(SPLAT, defines)),
+    const { program, uniform } = this.programFor(`blend${normals}`, () =>
+      createProgram(
+        gl,
+        withDefines(QUAD_VERTEX_SHADER, defines),
+        withDefines(SPLAT_FRAGMENT_SHADER, defines),
+      ),
     );
     gl.useProgram(program);
     this.bindVertices();
@@ -138,14 +145,14 @@ export class SplatPasses {
 
   private resolve(normals: boolean, unit: number, background: Vec3): void {
     const { gl } = this;
-    const { program, uniform } = this.cached(`resolve${normals}`, () =>
-      programOf(gl, WHOLE, withDefines(RESOLVE, normals ? ["NORMALS"] : [])),
+    const { program, uniform } = this.programFor(`resolve${normals}`, () =>
+      createProgram(gl, FULL_SCREEN_TRIANGLE, withDefines(RESOLVE_SHADER, normals ? ["NORMALS"] : [])),
     );
     this.targets.bind(normals);
     gl.useProgram(program);
     this.bindVertices();
-    const { colour, distance, normal } = this.gathering.textures!;
-    this.bind(uniform, "gathered", colour, 0);
+    const { color, distance, normal } = this.blendTarget.textures!;
+    this.bind(uniform, "gathered", color, 0);
     this.bind(uniform, "distances", distance, 1);
     if (normal && normals) this.bind(uniform, "axes", normal, 2);
     gl.uniform3f(uniform("background"), ...background);
@@ -171,13 +178,13 @@ export class SplatPasses {
     const { c2w } = camera;
     const [fx, cx] = [camera.fx, camera.cx].map((value) => (value * width) / camera.width);
     const [fy, cy] = [camera.fy, camera.cy].map((value) => (value * height) / camera.height);
-    const [beyondX, beyondY] = [(0.5 * OUTSIDE * width) / fx, (0.5 * OUTSIDE * height) / fy];
-    gl.uniform3f(uniform("eye"), ...eyeOf(header, camera));
-    // Rows of W: the camera's x, minus its y, minus its z; read as columns of it where it is not transposed.
+    const [beyondX, beyondY] = [(0.5 * SHAPE_MARGIN * width) / fx, (0.5 * SHAPE_MARGIN * height) / fy];
+    gl.uniform3f(uniform("eye"), ...relativeEye(header, camera));
+    // Rows of W: the camera's x, minus its y, minus its z.
     const W = [c2w[0], -c2w[1], -c2w[2], c2w[4], -c2w[5], -c2w[6], c2w[8], -c2w[9], -c2w[10]];
     gl.uniformMatrix3fv(uniform("W"), false, W);
     gl.uniform2f(uniform("focal"), fx, fy);
-    gl.uniform2f(uniform("centre"), cx, cy);
+    gl.uniform2f(uniform("center"), cx, cy);
     gl.uniform2f(uniform("size"), width, height);
     gl.uniform4f(
       uniform("limits"),
@@ -186,10 +193,10 @@ export class SplatPasses {
       -cy / fy - beyondY,
       (height - cy) / fy + beyondY,
     );
-    gl.uniform1f(uniform("near"), nearestOf(header, near));
+    gl.uniform1f(uniform("near"), nearDepth(header, near));
   }
 
-  private cached(key: string, make: () => Program): Program {
+  private programFor(key: string, make: () => Program): Program {
     let program = this.programs.get(key);
     if (!program) {
       program = make();

@@ -1,43 +1,43 @@
 /**
- * Draws splats and what edits changed of them with the page's own GPU, with the methods of `FieldRenderer`. Pictures are
- * those of `rendering.splats.rasterizer`.
+ * WebGL2 renderer of splats and their edits, with the methods of `FieldRenderer`. Images equal those of
+ * `rendering.splats.rasterizer`.
  *
- * The order of many splats comes from a worker: while the view is turned a picture has the order of a moment ago, and
- * `onOrder` says when it is worth drawing again; edits are sorted before they are shown (`prepare`).
+ * A worker sorts large sets: an image of a moving camera may have an earlier order, and `onOrder` is called when a redraw
+ * improves it. Edits are sorted before they are shown (`prepare`).
  */
 import { TooLarge } from "../field/atlas";
 import type { Vec3 } from "../field/level";
-import { reachOf } from "../field/march_uniforms";
+import { distanceRange } from "../field/march_uniforms";
 import type { PinholeCamera } from "../field/march_uniforms";
 import type { Bytes } from "../field/page_file";
-import { plainState, unbind } from "../field/present";
+import { resetState, unbindAll } from "../field/present";
 import type { LoadOptions, RenderOptions, SceneDrawer } from "../field/scene_drawer";
-import { Targets } from "../field/targets";
-import type { Reading } from "../field/targets";
-import { Views } from "../field/views";
+import { RenderTargets } from "../field/targets";
+import type { RenderedImage } from "../field/targets";
+import { ViewPasses } from "../field/views";
 import type { Distances, View } from "../field/views";
 import type { SplatSet } from "./depth_order";
-import { formatsOf } from "./blend_target";
-import type { Formats } from "./blend_target";
-import { readEditsBeside } from "./edits_reader";
-import { same, Sorter } from "./sorter";
-import { depthsOf } from "./splat_camera";
-import { CHANGED } from "./splat_edits";
+import { chooseFormats } from "./blend_target";
+import type { BlendFormats } from "./blend_target";
+import { readEditsInWorker } from "./edits_reader";
+import { haveSameDepths, Sorter } from "./sorter";
+import { sortDepths } from "./splat_camera";
+import { CHANGED_WORDS } from "./splat_edits";
 import type { SplatEdits } from "./splat_edits";
 import { readSplatLevels } from "./splat_file";
 import { SplatPasses } from "./splat_passes";
-import { PROJECTED, SplatStore } from "./splat_store";
+import { PROJECTED_BYTES, SplatStore } from "./splat_store";
 import { WordTexture } from "./splat_textures";
 
 type GL = WebGL2RenderingContext;
 
-/** Bytes that splats may take of the GPU unless the caller says otherwise. */
-const MEMORY = 768 * 2 ** 20;
+/** Default limit of the GPU memory of splats, in bytes. */
+const DEFAULT_MEMORY_BYTES = 768 * 2 ** 20;
 
-interface Changed {
+interface ChangedSplats {
   edits: SplatEdits;
   texture: WordTexture;
-  /** The splats that are drawn with these edits, and those of the field they were made of. */
+  /** The set of drawn splats with these edits, and the set of the field that it derives from. */
   set: SplatSet | null;
   own: SplatSet | null;
 }
@@ -45,34 +45,34 @@ interface Changed {
 export class SplatRenderer implements SceneDrawer<SplatEdits> {
   background: Vec3 = [1, 1, 1];
   near = 0;
-  /** Whether the edits are seen, of the splats that are there; false shows those before them. */
+  /** Whether the edits are applied; false draws the splats before the edits. */
   edited = true;
-  readonly targets: Targets;
+  readonly targets: RenderTargets;
   readonly inBands = false;
   inOrder = true;
   level: SceneDrawer["level"] = null;
   readonly uploaded = { last: 0, total: 0 };
-  private readonly views: Views;
-  /** Of the splats before the edits and under them: a split view wants both. */
+  private readonly viewPasses: ViewPasses;
+  /** Sorters of the splats before and after the edits: a split view needs both. */
   private readonly sorters = { before: new Sorter(), after: new Sorter() };
   private passes: SplatPasses;
   private store: SplatStore | null = null;
-  private changed: Changed | null = null;
-  /** Splats of edits that are to be shown next. */
+  private changed: ChangedSplats | null = null;
+  /** The sorted set of the edits that are shown next. */
   private prepared: { edits: SplatEdits; set: SplatSet; own: SplatSet } | null = null;
   private camera: PinholeCamera | null = null;
   private loading = 0;
   constructor(
     private readonly gl: GL,
-    private readonly memory = MEMORY,
-    formats: Formats | null = null,
+    private readonly memory = DEFAULT_MEMORY_BYTES,
+    formats: BlendFormats | null = null,
   ) {
-    this.targets = new Targets(gl);
-    this.views = new Views(gl, this.targets);
-    this.passes = new SplatPasses(gl, this.targets, formats ?? formatsOf(gl));
+    this.targets = new RenderTargets(gl);
+    this.viewPasses = new ViewPasses(gl, this.targets);
+    this.passes = new SplatPasses(gl, this.targets, formats ?? chooseFormats(gl));
   }
 
-  /** Called when splats have been sorted for the camera, so that another picture would be better. */
+  /** Called when the splats have been sorted for the camera, so that a redraw improves the image. */
   set onOrder(call: (() => void) | null) {
     for (const sorter of Object.values(this.sorters)) sorter.onOrder = call;
   }
@@ -81,7 +81,7 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     return this.count > 0;
   }
 
-  /** Splats that can be drawn, without edits. */
+  /** Number of loaded splats, without edits. */
   get count(): number {
     return this.store?.count ?? 0;
   }
@@ -90,7 +90,7 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     return this.store?.bytes ?? 0;
   }
 
-  /** Milliseconds that the last shader took to compile, and how many were. */
+  /** Milliseconds of the last compilation of a shader. */
   get compileTime(): number {
     return this.passes.compileTime;
   }
@@ -99,7 +99,7 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     return this.passes.compiled;
   }
 
-  /** Orders that the page has made itself, and waited for. */
+  /** Number of orders for which the page has waited. */
   get sortedHere(): number {
     return this.sorters.before.sortedHere + this.sorters.after.sortedHere;
   }
@@ -112,7 +112,7 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     this.camera = camera;
   }
 
-  /** Loads splats; a later call takes the place of one that is under way. Throws `TooLarge` beyond the memory. */
+  /** Loads splats; a later call replaces one in progress. Throws `TooLarge` beyond the memory limit. */
   async load(source: ReadableStream<Bytes> | ArrayBuffer, options: LoadOptions = {}): Promise<void> {
     const turn = ++this.loading;
     const wanted = (): boolean => turn === this.loading;
@@ -140,13 +140,13 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     }
   }
 
-  /** Uploads what was shown again, after the context was lost and restored. */
+  /** Uploads the splats again after the context was lost and restored. */
   async restore(): Promise<void> {
     const { gl, store, changed } = this;
     this.changed = null;
     this.targets.forget();
-    this.views.forget();
-    this.passes = new SplatPasses(gl, this.targets, formatsOf(gl));
+    this.viewPasses.forget();
+    this.passes = new SplatPasses(gl, this.targets, chooseFormats(gl));
     const turn = ++this.loading;
     await store?.restore(() => turn === this.loading);
     this.setEdits(changed?.edits ?? null);
@@ -154,10 +154,10 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
 
   /** Edits of splats: a file holds all of them, whatever was there before. */
   async readEdits(file: ArrayBuffer): Promise<SplatEdits> {
-    return await readEditsBeside(file);
+    return await readEditsInWorker(file);
   }
 
-  /** Has the splats of edits sorted, and is done when `setEdits` with the same edits need not wait for that. */
+  /** Sorts the splats of edits, so that `setEdits` with the same edits need not wait for a sort. */
   async prepare(edits: SplatEdits): Promise<void> {
     const { store, camera } = this;
     if (
@@ -168,12 +168,15 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
       edits.count !== store.header.count
     )
       return;
-    const set = changedSet(edits, store);
+    const set = combineSets(edits, store);
     this.prepared = { edits, set, own: store.set };
-    await this.sorters.after.prepare(set, depthsOf(store.header, camera, this.near));
+    await this.sorters.after.prepare(set, sortDepths(store.header, camera, this.near));
   }
 
-  /** What edits changed; null for nothing. Throws where it is of other splats, `TooLarge` beyond the memory. */
+  /**
+   * Replaces the edits; null for none. Throws for edits of other splats, and `TooLarge` beyond the memory
+   * limit.
+   */
   setEdits(edits: SplatEdits | null): void {
     const { prepared } = this;
     this.changed?.texture.dispose();
@@ -182,31 +185,31 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     if (edits === null || (edits.changed === 0 && !edits.hidden.includes(1))) return;
     if (this.store !== null && edits.count !== this.store.header.count)
       throw new Error(`edits of ${edits.count} splats, the page has ${this.store.header.count}; reload it`);
-    const bytes = this.bytes + (4 * CHANGED + PROJECTED) * edits.changed;
+    const bytes = this.bytes + (4 * CHANGED_WORDS + PROJECTED_BYTES) * edits.changed;
     if (bytes > this.memory)
       throw new TooLarge(
         `the edited splats take ${mebibytes(bytes)} MiB of the GPU, more than the ${mebibytes(this.memory)} allowed`,
       );
     const texture = new WordTexture(this.gl, edits.records.length);
     if (edits.changed > 0)
-      texture.putRows(edits.records, 0, Math.ceil(edits.records.length / texture.stride));
+      texture.uploadRows(edits.records, 0, Math.ceil(edits.records.length / texture.stride));
     const { set, own } = prepared?.edits === edits ? prepared : { set: null, own: null };
     this.changed = { edits, texture, set, own };
     this.uploaded.last = edits.changed > 0 ? edits.records.byteLength : 0;
     this.uploaded.total += this.uploaded.last;
   }
 
-  /** Draws what the camera sees into `targets`; false while there is nothing to draw. */
+  /** Draws the camera's image into `targets`; false while there is nothing to draw. */
   render(options: RenderOptions = {}): boolean {
     const { gl, store, camera, background, near } = this;
     if (!store || store.count === 0 || !camera || gl.isContextLost()) return false;
     const { width, height } = this.targets;
-    const set = this.shown(store);
-    const depths = depthsOf(store.header, camera, near);
+    const set = this.shownSet(store);
+    const depths = sortDepths(store.header, camera, near);
     const sorter = set === store.set ? this.sorters.before : this.sorters.after;
-    const order = sorter.of(set, depths, options.sorted ?? false);
-    this.inOrder = same(order.depths, depths);
-    plainState(gl);
+    const order = sorter.orderFor(set, depths, options.sorted ?? false);
+    this.inOrder = haveSameDepths(order.depths, depths);
+    resetState(gl);
     const rows = options.rows ?? { first: 0, count: height };
     const columns = options.columns ?? { first: 0, count: width };
     const changed = this.changed?.texture ?? null;
@@ -221,11 +224,11 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
       rows,
       columns,
     });
-    unbind(gl);
+    unbindAll(gl);
     return true;
   }
 
-  /** Puts a view of what was drawn on the canvas, or in a framebuffer, of this size. */
+  /** Draws a view of the image on the canvas, or into a framebuffer, of a size. */
   show(
     width: number,
     height: number,
@@ -235,22 +238,22 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     this.passes.bindVertices();
-    plainState(gl);
-    this.views.show(view, this.reach, width, height);
-    unbind(gl);
+    resetState(gl);
+    this.viewPasses.show(view, this.reach, width, height);
+    unbindAll(gl);
   }
 
-  /** What was drawn, top row first. */
-  read(normals = false): Reading {
+  /** The drawn image, top row first. */
+  read(normals = false): RenderedImage {
     return this.targets.read(normals);
   }
 
-  /** At most about `most` distances of what was drawn, top row first. */
+  /** At most about `most` distances of the drawn image, top row first. */
   distances(most: number): Distances {
     this.passes.bindVertices();
-    plainState(this.gl);
-    const found = this.views.distances(most);
-    unbind(this.gl);
+    resetState(this.gl);
+    const found = this.viewPasses.distances(most);
+    unbindAll(this.gl);
     return found;
   }
 
@@ -258,47 +261,47 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     this.targets.wait();
   }
 
-  /** Frees what lies on the GPU, and ends the worker. */
+  /** Frees all GPU objects, and ends the workers. */
   dispose(): void {
     this.loading++;
     this.setEdits(null);
     this.store?.dispose();
     this.store = this.level = null;
     for (const sorter of Object.values(this.sorters)) sorter.dispose();
-    this.views.dispose();
+    this.viewPasses.dispose();
     this.targets.dispose();
     this.passes.dispose();
   }
 
-  /** The splats that are drawn: the same object while they are the same. */
-  private shown(store: SplatStore): SplatSet {
+  /** The drawn splats; an unchanged set is an identical object. */
+  private shownSet(store: SplatStore): SplatSet {
     const { changed } = this;
     if (!this.edited || changed === null) return store.set;
     if (changed.set === null || changed.own !== store.set) {
       changed.own = store.set;
-      changed.set = changedSet(changed.edits, store);
+      changed.set = combineSets(changed.edits, store);
     }
     return changed.set;
   }
 
-  /** The nearest and farthest distance of the field's box from the camera. */
+  /** The smallest and the largest distance of the field's box from the camera. */
   private get reach(): [number, number] {
     const { store, camera } = this;
     if (!store || !camera) return [0, 1];
-    return reachOf(store.header.bounds, camera);
+    return distanceRange(store.header.bounds, camera);
   }
 }
 
 const mebibytes = (bytes: number): number => Math.ceil(bytes / 2 ** 20);
 
-function changedSet(edits: SplatEdits, store: SplatStore): SplatSet {
-  return { means: store.set.means, hidden: edits.hidden, changed: arrivedOf(edits, store) };
+function combineSets(edits: SplatEdits, store: SplatStore): SplatSet {
+  return { means: store.set.means, hidden: edits.hidden, changed: meansOfArrived(edits, store) };
 }
 
-/** The means of changed splats, NaN where those whose colours they have are not there yet. */
-function arrivedOf({ means, records, changed }: SplatEdits, store: SplatStore): Float32Array {
+/** The means of changed splats [M, 3]; NaN for a splat whose source has not arrived. */
+function meansOfArrived({ means, records, changed }: SplatEdits, store: SplatStore): Float32Array {
   if (store.isWhole) return means;
   const out = Float32Array.from(means);
-  for (let n = 0; n < changed; n++) if (records[CHANGED * n + 3] >= store.count) out[3 * n] = NaN;
+  for (let n = 0; n < changed; n++) if (records[CHANGED_WORDS * n + 3] >= store.count) out[3 * n] = NaN;
   return out;
 }

@@ -193,7 +193,9 @@ export function options(app: App, actions: Actions): HTMLElement {
   return whole;
 }
 
-/** Adds a tooltip to a control, and its label and tooltip for screen readers: the label is a separate element. */
+/**
+ * Adds a tooltip to a control, and its label and tooltip for screen readers: the label is a separate element.
+ */
 function addTooltip(binding: BladeApi, what: string): void {
   binding.element.title = what;
   const input = binding.element.querySelector("input, select")!;

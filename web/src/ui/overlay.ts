@@ -1,4 +1,7 @@
-/** Elements over the image: the slider of the split view, the numbers of a drag, notices, the loss of the server. */
+/**
+ * Elements over the image: the slider of the split view, the numbers of a drag, notices, the loss of the
+ * server.
+ */
 import type { App } from "../app/app";
 import { describeOperation } from "../editing/operations";
 import type { Pointer } from "../editing/pointer";

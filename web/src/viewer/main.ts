@@ -1,7 +1,7 @@
 /** Script of exported scenes: the viewer, and the renderers under one global name. */
 import { FieldRenderer } from "../field/field_renderer";
 import { readEdits } from "../field/page_edits";
-import { readEditsBeside } from "../splats/edits_reader";
+import { readEditsInWorker } from "../splats/edits_reader";
 import { readSplatEdits } from "../splats/splat_edits";
 import { SplatRenderer } from "../splats/splat_renderer";
 import { takeBytes } from "./sources";
@@ -13,7 +13,7 @@ interface ViewerApi {
   readEdits: typeof readEdits;
   SplatRenderer: typeof SplatRenderer;
   readSplatEdits: typeof readSplatEdits;
-  readEditsBeside: typeof readEditsBeside;
+  readEditsBeside: typeof readEditsInWorker;
   /** Takes chunks of embedded files. */
   take: typeof takeBytes;
   /** The viewer of the page. */
@@ -31,7 +31,7 @@ window.cagefieldViewer = {
   readEdits,
   SplatRenderer,
   readSplatEdits,
-  readEditsBeside,
+  readEditsBeside: readEditsInWorker,
   take: takeBytes,
 };
 

@@ -3,7 +3,7 @@
  * `cagefield.pages.page_path`).
  */
 import { EDIT_LAYOUT } from "../field/layout";
-import { joined } from "../field/level";
+import { joinBytePlanes } from "../field/level";
 import type { Vec3 } from "../field/level";
 import { ByteReader, PageFile } from "../field/page_file";
 import type { Lattice, PageEdits } from "../field/page_edits";
@@ -62,7 +62,7 @@ export class PathEdits {
     const stored: Lattice[] = [];
     for (const n of header.edits.keys()) rows.push((await file.read(`rows.${n}`)) as Float32Array);
     for (let k = 0; k < header.stored; k++)
-      stored.push({ key: `${k}`, halves: joined((await file.read(`lattice.${k}`)) as Uint8Array) });
+      stored.push({ key: `${k}`, halves: joinBytePlanes((await file.read(`lattice.${k}`)) as Uint8Array) });
     const layers: Layer[] = [];
     for (const [k, key] of header.layer_keys.entries()) layers.push(await readLayer(file, `layer.${k}`, key));
     const states = header.edits.map((edits, n) => {

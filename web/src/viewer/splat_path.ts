@@ -1,10 +1,10 @@
 /** Edits of splats along a camera path (see `cagefield.pages.page_splat_path`). */
 import type { Vec3 } from "../field/level";
 import { ByteReader, PageFile } from "../field/page_file";
-import { axesOf, covariancesOf, rotationOf } from "../splats/shapes";
-import { changedRecords, unpackedBits } from "../splats/splat_edits";
+import { decodeAxes, covariancesFromAxes, decodeRotation } from "../splats/shapes";
+import { encodeChangedRecords, unpackBits } from "../splats/splat_edits";
 import type { SplatEdits } from "../splats/splat_edits";
-import { wholes } from "../splats/splat_file";
+import { joinHighLowBytes } from "../splats/splat_file";
 import { intervalAt } from "./camera_path";
 
 export const SPLAT_PATH_MAGIC = "cagesppa";
@@ -51,7 +51,7 @@ class Shapes {
   ) {}
 
   get axes(): Float32Array {
-    return (this.made ??= axesOf(this.rotations, this.scales, this.logs));
+    return (this.made ??= decodeAxes(this.rotations, this.scales, this.logs));
   }
 }
 
@@ -79,7 +79,7 @@ export class SplatPath {
     const lists = new Map<string, Uint8Array | Int32Array>();
     const shapes = new Map<string, Shapes>();
     const list = (name: List, n: number): Uint8Array | Int32Array => lists.get(`${name}.${header[name][n]}`)!;
-    const pairs = (name: List, n: number): Uint16Array => wholes(list(name, n) as Uint8Array);
+    const pairs = (name: List, n: number): Uint16Array => joinHighLowBytes(list(name, n) as Uint8Array);
     const states: State[] = [];
     for (const n of header.changed.keys()) {
       // The file has each array where a state first needs it.
@@ -97,7 +97,7 @@ export class SplatPath {
         shapes: shapes.get(key)!,
         opacities: pairs("opacities", n),
         gains: list("gains", n) as Int32Array,
-        moves: undoDifferences(wholes((await file.read(`moves.${n}`)) as Uint8Array), before),
+        moves: undoDifferences(joinHighLowBytes((await file.read(`moves.${n}`)) as Uint8Array), before),
       });
     }
     return new SplatPath(header, times, order, states);
@@ -121,7 +121,7 @@ export class SplatPath {
       covariances = interpolateRows(covariances, farGeometry.covariances, matches, 6, weight);
     }
     const count = state.sources.length;
-    const records = changedRecords(
+    const records = encodeChangedRecords(
       state.sources,
       means,
       covariances,
@@ -131,7 +131,7 @@ export class SplatPath {
     );
     return {
       count: header.count,
-      hidden: unpackedBits(state.hidden, header.count),
+      hidden: unpackBits(state.hidden, header.count),
       changed: count,
       means,
       records,
@@ -197,12 +197,12 @@ function decodeGeometry({ moves, shapes }: State, { low, step, stretch }: Header
   for (let n = 0; n < count; n++) {
     const row = (k: number): number => moves[k * count + n];
     for (let k = 0; k < 3; k++) means[3 * n + k] = low[k] + step * row(k);
-    const turn = rotationOf(row(3), row(4), row(5));
+    const turn = decodeRotation(row(3), row(4), row(5));
     const [xx, xy, xz, yy, yz, zz] = [6, 7, 8, 9, 10, 11].map((k) => stretch * (row(k) - 32768));
     const stretched = [1 + xx, xy, xz, xy, 1 + yy, yz, xz, yz, 1 + zz];
     multiply(moved, 9 * n, multiply([], 0, turn, 0, stretched, 0), 0, axes, 9 * n);
   }
-  return { means, covariances: covariancesOf(moved) };
+  return { means, covariances: covariancesFromAxes(moved) };
 }
 
 type Numbers = number[] | Float32Array;
