@@ -1,4 +1,4 @@
-"""What it costs to refresh a renderer for one edit of ten that share an outer cage, against that edit alone.
+"""Cost of refreshing a renderer for one edit of ten that share an outer cage, against that edit alone.
 
     python -m benchmarks.chain_refresh SCENE [-o benchmarks/results/chain_refresh.md]
 

@@ -1,4 +1,4 @@
-"""What it costs to refresh the flow shell's lattice while an edit is dragged, and how far the lattice is off.
+"""Cost of refreshing the flow shell's lattice during a drag, and the lattice's error.
 
     python -m benchmarks.flow_lattice
 

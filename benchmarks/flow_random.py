@@ -59,7 +59,7 @@ CLOSED = 1e-6
 
 @dataclass(frozen=True)
 class Promises:
-    """What one edit kept of the promises; errors as shares of the outer cage's size.
+    """Guarantees kept by one edit; errors as shares of the outer cage's size.
 
     least: least det of d(deformed)/d(canonical) over the shell's points, -1 where one is not positive; moved:
     of points outside the outer cage, through the stack; inside: of points in the inner cage, against the
@@ -156,7 +156,7 @@ def random_operation(rng: np.random.Generator) -> Operation:
 
 
 def measure(edit: Edit, rng: np.random.Generator, n: int, kind: type, compared: bool) -> Promises:
-    """What the edit keeps, at about n points of each kind."""
+    """Guarantees kept by the edit, at about n points of each kind."""
     assert edit.outer is not None
     shell = FlowShell(edit.inner, edit.deformed, edit.outer)
     knots = shell.knots

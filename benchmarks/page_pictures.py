@@ -125,7 +125,7 @@ class PagePictures:
             edits = EditStack([])
             if edit:
                 stack = load_edits(EXAMPLES / f"{edit}.yaml")
-                # What they leave is filled, and light is changed, as in the editor.
+                # Uncovered regions are inpainted, and light is changed, as in the editor.
                 edits = for_pages(dataclasses.replace(scene, edits=stack).prepared_edits)
             renderer = base.with_edits(edits)
             data = encode_page_edits(renderer)

@@ -1,4 +1,4 @@
-"""What fill, light and feather cost in each frame: discrete edits with them over the same edits without.
+"""Cost of fill, light and feather in each frame: discrete edits with them over the same edits without.
 
 python -m benchmarks.patched_frames WORK [-o FILE.md] [--steps 4000] [--frames 24]
 

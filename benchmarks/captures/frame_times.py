@@ -144,7 +144,7 @@ def default_edit(scene: Scene, cameras: Sequence[Camera]) -> Edit:
 
 
 def as_move(edit: Edit) -> Edit:
-    """The same motion as a discrete move."""
+    """Discrete move with the motion of a continuous edit."""
     return Edit.move(edit.inner, operations=edit.operations, **edit.shared_options)
 
 

@@ -31,7 +31,7 @@ class BenchCaptures:
     out: Output = Path("benchmarks/results/captures.md")
     """Markdown file for the table."""
     fields: tuple[Literal["splat", "voxel"], ...] = ("splat",)
-    """What is trained on each capture."""
+    """Kind of field trained on each capture."""
     minutes: float = 5.0
     """How long to train each."""
     steps: int | None = None

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class BenchGrids:
-    """What each shell map makes of a lattice when the inner cage is turned; writes a PNG."""
+    """A lattice under each shell map when the inner cage is turned; writes a PNG."""
 
     out: Output = Path("docs/grids.png")
     """PNG file for the picture."""
@@ -50,7 +50,7 @@ class BenchGrids:
 
 @dataclass(frozen=True)
 class BenchAblation:
-    """What one choice of an edit does, on a trained built-in scene; writes a picture and a Markdown table."""
+    """Effect of one option of an edit, on a trained built-in scene; writes a picture and a Markdown table."""
 
     what: tyro.conf.Positional[Literal["outer-size", "resolution", "discrete-continuous", "limits"]]
     """The size of the outer cage; nodes of the lattice; discrete or continuous; what editing cannot do."""

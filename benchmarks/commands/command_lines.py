@@ -1,4 +1,4 @@
-"""What the benchmarks' commands share: the command line that a table names, and a folder to work in."""
+"""Shared parts of the benchmarks' commands: the command line that a table names, and a folder to work in."""
 
 from __future__ import annotations
 

@@ -51,14 +51,14 @@ class Case:
 
     @property
     def edits(self) -> EditStack:
-        """What is measured: an exact map, where that is the truth, carries the light along as it was."""
+        """Measured edits: an exact map, where that is the truth, carries the light along as it was."""
         if self.moved is not None:
             return self.given
         return EditStack(edit.replace(relight="none") for edit in self.given)
 
     @property
     def kind(self) -> str:
-        """What the edits are: continuous where one of them is, else what the first does."""
+        """Kind of the edits: continuous where one of them is, else the kind of the first."""
         if any(isinstance(edit, Continuous) for edit in self.edits):
             return "continuous"
         first = self.edits[0]

@@ -1,4 +1,4 @@
-"""What a figure was measured on."""
+"""Machine of a measurement: processor, cores, GPU."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the edit benchmark works on: photos, trained fields and truths, kept in a folder between runs.
+"""Material of the edit benchmark: photos, trained fields and truths, kept in a folder between runs.
 
     WORKDIR/SCENE/photos-KEY/      photos in NeRF-synthetic layout
     WORKDIR/SCENE/field-KEY/       the scene trained on them
@@ -61,7 +61,7 @@ BAKED = 64
 
 @dataclass(frozen=True)
 class Settings:
-    """What is photographed, how the fields are trained, and how the exact maps are rendered.
+    """Settings of the photos, of the training of fields, and of the rendering of exact maps.
 
     Photos are size x size pixels. The truth of continuous edits is photographed at exact_size x exact_size
     for the first `exact_views` test cameras; that of the methods that are compared at compared_size x

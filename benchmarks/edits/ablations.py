@@ -36,7 +36,7 @@ _POINTS = 20_000
 
 @dataclass(frozen=True)
 class Ablation:
-    """What one gives."""
+    """Result of one choice."""
 
     table: Table
     picture: NDArray[np.uint8]
@@ -77,7 +77,7 @@ class Subject:
 
 
 def outer_size(subject: Subject, gaps: Sequence[float] = GAPS) -> Ablation:
-    """The same motion in outer cages of several sizes: how far the surroundings give way."""
+    """One motion in outer cages of several sizes: extent of the deformed surroundings."""
     edit = continuous(subject.case)
     rows: list[tuple[str, ...]] = []
     panels: list[Panel] = [("before", subject.picture(EditStack([])))]
@@ -161,7 +161,7 @@ def resolution(subject: Subject, resolutions: Sequence[int] = RESOLUTIONS) -> Ab
 
 
 def discrete_continuous(subject: Subject) -> Ablation:
-    """The same motion as a discrete move, a copy and a continuous edit."""
+    """One motion as a discrete move, a copy and a continuous edit."""
     kinds: dict[str, Callable[[Continuous], Edit]] = {
         "continuous": lambda e: e,
         "discrete": lambda e: Edit.move(e.inner, operations=e.operations, **e.shared_options),
@@ -217,5 +217,5 @@ def title(case: Case) -> str:
 
 
 def with_notes(ablation: Ablation, notes: Sequence[str]) -> Ablation:
-    """The same with more notes below the table."""
+    """Table with more notes below it."""
     return replace(ablation, table=replace(ablation.table, notes=(*ablation.table.notes, *notes)))

@@ -177,7 +177,7 @@ def summaries(rows: Sequence[Comparison]) -> list[str]:
 def _better(
     own: Sequence[Comparison], flow: dict[tuple[str, str], Comparison]
 ) -> list[tuple[str, list[str]]]:
-    """What a method is better at than the flow, and on which edits."""
+    """Figures in which a method beats the flow, with their edits."""
     found: dict[str, list[str]] = {}
     for row in own:
         other = flow.get((row.case.scene, row.case.name))

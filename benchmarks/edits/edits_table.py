@@ -45,7 +45,7 @@ _NAN = float("nan")
 
 @dataclass(frozen=True)
 class Revealed:
-    """What a discrete edit brings to light, in dB; NaN where there are no such pixels.
+    """Figures of the pixels that a discrete edit uncovers or shades, dB; NaN without such pixels.
 
     old_shadows   against the truth whose ambient occlusion stays as modelled
     uncovered     share of pixels that show a surface which the part hid; `_unedited` is the PSNR there of the
@@ -144,7 +144,7 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
 
 
 def _described(config: VoxelConfig | NerfConfig | SplatConfig) -> str:
-    """What the fields are, after how long they were trained."""
+    """Description of the fields by the configuration of their training."""
     if isinstance(config, SplatConfig):
         most = "" if config.splats is None else f", {config.splats} at most"
         return f": splats of degree {config.sh_degree}{most}."

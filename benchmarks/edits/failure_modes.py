@@ -1,4 +1,4 @@
-"""What moving content alone cannot do: shadows stay behind, and what no photo saw is not there.
+"""Failure modes of moved content: shadows stay behind, and regions that no photo shows are missing.
 
 Source: Li & Pan, "Interactive Geometry Editing of Neural Radiance Fields", the section on limits.
 """

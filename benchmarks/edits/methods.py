@@ -64,7 +64,7 @@ METHODS: dict[str, Method] = {
     "mean value": Method("mean value", PEER_LATTICE),
     "harmonic": Method("harmonic", PEER_LATTICE),
 }
-"""What is compared, ours first."""
+"""Compared methods, ours first."""
 
 MAPS: tuple[str, ...] = tuple(dict.fromkeys(method.shell for method in METHODS.values()))
 """The maps among them, each once."""

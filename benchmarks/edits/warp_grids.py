@@ -154,7 +154,7 @@ def grids(
 
 
 def caption(measured: Distortion) -> str:
-    """What stands under a panel."""
+    """Caption of a panel."""
     if not measured.folds:
         return f"min det J {measured.least_det:.2f}"
     return f"folds: min det J {measured.least_det:.2f}"

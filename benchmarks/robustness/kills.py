@@ -48,7 +48,7 @@ from editor_server import PageClient, editor_server, page  # noqa: E402
 
 @dataclass
 class Told:
-    """What pages were told before their editors were killed."""
+    """Messages to pages before their editors were killed."""
 
     changes: int = 0
     saves: int = 0
@@ -188,7 +188,7 @@ def _render_until_killed(client: PageClient, edit: int, told: Told) -> tuple[int
 
 
 def _problem(folder: Path, kept: int, saved: int) -> str | None:
-    """What the next editor does not find; it then saves what it has."""
+    """Content that the next editor does not find; the editor then saves."""
     try:
         for picture in (folder / "views").glob("*.png"):
             read_image(picture)

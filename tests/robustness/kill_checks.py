@@ -70,7 +70,7 @@ def trained_problem(folder: Path, said: int) -> str | None:
 
 
 def pictures_problem(folder: Path, said: int) -> str | None:
-    """What is wrong with pictures over old ones of 4 x 4 pixels: each old, or new and 32 pixels wide."""
+    """Fault of pictures that replace old ones of 4 x 4 pixels: each is old, or new and 32 pixels wide."""
     from cagefield.images.image_files import read_image
 
     out = folder / "out"

@@ -49,12 +49,12 @@ class Export:
     """Splats: .ply, .compressed.ply, .spz, .sog, .splat or .glb; a mesh: .ply or .glb; points: .ply; a page
     that any browser opens without a server: .html; with --embed a folder."""
     what: Annotated[What, tyro.conf.arg(name="as")] = "splats"
-    """What to write; a file that ends in .html is a page."""
+    """Kind of file; a file that ends in .html is a page."""
     embed: Flag = False
     """A page as a folder for a web site, to be shown in an <iframe>: its field is a file of its own, which
     shows coarsely while it loads."""
     selection: str | None = None
-    """Only what a cage holds: an edit's name (its inner cage, where the edit has taken it), an edit file, or
+    """Only a cage's content: an edit's name (its inner cage, where the edit has taken it), an edit file, or
     a cage such as '{center: [0, 0, 1], size: 2}'."""
     axes: Axes | None = None
     """Axes of a file of splats: where x, y and z point, right or left, up or down, front or back; left out,

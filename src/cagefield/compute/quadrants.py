@@ -11,7 +11,7 @@ from typing import Any, cast
 
 _HIDDEN = "torch" not in sys.modules
 if _HIDDEN:
-    # What has no module cannot be imported.
+    # A name without a module cannot be imported.
     sys.modules["torch"] = cast(Any, None)
 try:
     import quadrants as qd

@@ -418,7 +418,7 @@ def _from_cage(cage: Cage) -> dict[str, Any]:
     rotation = euler_degrees(Rotation.from_matrix(R))
     size = np.linalg.norm(cage.affine[0], axis=0)
     for digits in (12, 9, 6):
-        # What a person wrote has few digits; what a program computed is tried as it is, last.
+        # Numbers written by a person have few digits; computed ones are tried last, as they are.
         center, lengths, turn = (_short(v, digits) for v in (cage.pivot, size, rotation))
         if (lengths > 0.0).all() and Cage.box(center, lengths, np.radians(turn)) == cage:
             content: dict[str, Any] = {"center": center.tolist(), "size": lengths.tolist()}

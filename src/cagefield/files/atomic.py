@@ -169,7 +169,7 @@ def recover_folder(target: Path, is_whole: Callable[[Path], bool]) -> Path | Non
 
 
 def _others(folder: Path, own: Collection[str]) -> list[Path]:
-    """What a folder holds beside the names in `own`."""
+    """Entries of a folder other than the names in `own`."""
     return [] if not folder.is_dir() else [entry for entry in folder.iterdir() if entry.name not in own]
 
 

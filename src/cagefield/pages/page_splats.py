@@ -272,7 +272,7 @@ def _decode_level(header: dict[str, Any], parts: dict[str, NDArray[Any]], count:
 def _layout(field: SplatField) -> tuple[NDArray[np.int64], tuple[int, ...]]:
     """(rows [N] in a page's order, where levels end)."""
     codes = morton_codes(field.means, field.means.min(axis=0), field.means.max(axis=0))
-    # What covers most comes first: opacity times the area across the thinnest axis.
+    # The largest coverage comes first: opacity times the area across the thinnest axis.
     two = np.sort(field.log_scales, axis=1)[:, 1:].sum(axis=1)
     first = np.argsort(-(np.log(np.maximum(field.opacities, 1e-6)) + two), kind="stable")
     ends, end = [], FIRST

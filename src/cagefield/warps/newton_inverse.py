@@ -29,7 +29,7 @@ def inverted(
     error = np.linalg.norm(back - points, axis=1)
     share = np.ones(len(x))
     for _ in range(STEPS):
-        # What is nearly there and does not get nearer is held up by rounding.
+        # A point that is nearly there and gets no nearer is limited by rounding.
         stuck = (share < 1.0) & ((error < 1e-10 * size) | (share < LEAST_SHARE))
         rows = np.flatnonzero((error > 1e-13 * size) & ~stuck)
         if len(rows) == 0:

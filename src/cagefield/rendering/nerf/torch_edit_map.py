@@ -76,7 +76,7 @@ class TensorMap:
         return torch.stack(columns, dim=2)
 
     def _mapped(self, points: Any, viewdirs: Any, preserve_opacity: bool) -> tuple[Any, Any, Any, Any]:
-        """What the call returns, and the places [N] that samples are read at (`fields.voxel_layers`)."""
+        """Results of the call, and x offsets [N] of the layers that samples read (`fields.voxel_layers`)."""
         devices.start()
         samples = torch.cat([points, viewdirs], dim=1).contiguous()
         out = torch.empty((len(samples), 8), dtype=torch.float32, device=self.device)

@@ -170,7 +170,7 @@ class MovedSplats:
         gains = np.ones((len(self.source), 3)) if self.gains is None else self.gains.copy()
         if patch.part is not None and len(carried):
             gains[here:] *= np.exp(patch.part.at(carried))[:, None]
-        # What the edit left: splats in their own places, and those that earlier edits took there.
+        # Splats that the edit leaves: those in their own places, and those that earlier edits took there.
         inside = np.empty(len(field), bool)
         in_boxes(field.means, patch.region.aabb[None], inside)
         still = np.flatnonzero(inside & ~self.left)

@@ -333,7 +333,7 @@ def _row(parent: NDArray[np.int64], direction: Array, r: Array, opacity: Array) 
             depth[step:] += np.where(same, beside[:-step], 0.0)
             depth[:-step] += np.where(same, beside[step:], 0.0)
         alpha = -np.expm1(np.log1p(-alpha) * wanted / np.maximum(depth, 1e-30))
-    # What the row lets through beside its middle, on all the width across it, is what the splat does there.
+    # The transmittance of the row beside its middle, over all the width across it, equals that of the splat.
     own, mass = mass_across(-np.expm1(-wanted)), mass_across(alpha)
     for step in (1, 2):
         beside = mass_across(alpha * np.exp(-0.5 * (step * SPACING) ** 2))
@@ -353,7 +353,7 @@ def _cut(edit: Discrete, field: SplatField, rows: NDArray[np.int64], points: Arr
         [] if isinstance(edit, Paste) else [(edit.inner, np.ones(len(rows), bool))]
     )
     if not isinstance(edit, Delete | Paste):
-        # What lands in the deformed cage hides what stays there, but not what leaves.
+        # Splats that land in the deformed cage hide those that stay there, but not those that leave.
         cuts.append((edit.deformed, ~edit.inner.contains(points) | isinstance(edit, Copy)))
     size = np.linalg.norm(A, axis=(1, 2))
     for cage, concerned in cuts:
@@ -390,7 +390,7 @@ def _shaded(
         if light is not None:
             along = [points[here, None] + way * steps[here] for way in (-1.0, 0.0, 1.0)]
             change[here] = np.ptp([light.at(at.reshape(-1, 3)).reshape(-1, 3) for at in along], axis=0)
-            # What is smaller than the light's grid shows noise of that.
+            # Splats smaller than a cell of the light's grid show its noise.
             change[here] *= np.linalg.norm(steps[here], axis=2) > 0.5 * light.spacing.max()
     return _rows(field, rows, change, SHADE)
 

@@ -60,7 +60,7 @@ def scene_of_file(file: Path) -> Path:
     from cagefield.scene.scene import Scene
 
     stem = stem_of(file).encode(errors="replace")[:_LONGEST].decode(errors="ignore")
-    # What memory cannot hold is refused before minutes go into its digest.
+    # A file beyond the memory is refused before minutes go into its digest.
     with _recorded_warnings() as lines:
         source = open_within_memory(file) if file.is_file() and check_regular(file) > _LARGE else None
     end = None if source is None else _end(source)
