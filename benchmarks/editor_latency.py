@@ -1,16 +1,18 @@
-"""Measures the editor in headless Chromium: from the mouse's move to the presented frame that shows it.
+"""Latency of the first drags in a fresh editor, in headless Chromium whose page draws in software.
 
-python -m benchmarks.editor_latency SCENE [-o benchmarks/results/editor.md]
+python -m benchmarks.editor_latency SCENE... [--repeats 5] [-o benchmarks/results/editor.md]
 
-The arm of the digger is dragged up and down by the gizmo in an 800x600 window, as a continuous edit. A move
-counts from the time of its mouse event to the time at which the frame after the one that drew it begins, by
-the page's own clock. Moves that no picture shows, because a newer one was there, have no latency. Letting go
-is measured in a window whose picture is 800x800.
+Each repetition starts `cagefield view`, waits for the first whole picture, adds a cage around the middle of
+the content, and drags it up, down, up by the gizmo: 1.5 s with ten moves of the mouse, then until the final
+picture. Kernels are cached on disk, as from a second start on (`--empty-cache`: none are); light, visibility
+and patches are not. A move counts from its mouse event to the frame after the one that drew its picture, by
+the page's clock. After letting go the whole picture without light counts, then the final one.
 """
 
 from __future__ import annotations
 
-import math
+import json
+import os
 import re
 import shutil
 import subprocess
@@ -19,24 +21,22 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import tyro
 from playwright.sync_api import Page, sync_playwright
 
+import cagefield
 from benchmarks.common.machine import cpu_model
 from cagefield.compute import devices
 from cagefield.errors import CagefieldError
+from cagefield.fields.splat_field import SplatField
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.scene.scene import Scene
 
-EDITS = """\
-version: 1
-edits:
-  - name: arm
-    inner: {center: [0.68, -0.11, 0.35], size: [0.5, 0.5, 1.1]}
-    outer: {margin: 0.35}
-    lattice: 64
-"""
+Kind = Literal["continuous", "discrete"]
+
 FLAGS = [
     "--headless",
     "--no-sandbox",
@@ -47,21 +47,42 @@ FLAGS = [
     "--disable-sync",
     "--no-first-run",
 ]
-FRAME = (46, 68)
-"""Width and height of the window that is not the picture, with the panel closed."""
-PATIENCE = 180.0
+WINDOW = 1104, 850
+"""Width and height of the window; the picture is 1058x782, with the panel closed."""
+DRAGS, MOVES, DRAG_SECONDS, DRAG_PX = 3, 10, 1.5, 40
+PATIENCE = 300.0
+
+
+@dataclass
+class Drag:
+    """One drag: milliseconds from its first move to the first picture of it, and after letting go."""
+
+    pictures: int
+    width: int
+    """Median width of the moving pictures, pixels; 0 without any."""
+    first: float
+    """First moving picture after the first move; NaN where none came before letting go."""
+    whole: float
+    """First whole picture in full resolution after letting go."""
+    final: float
 
 
 @dataclass
 class EditorLatency:
-    """Measure the editor's latency on a scene of the built-in digger."""
+    """Measure the first drags of a fresh editor."""
 
-    scene: tyro.conf.Positional[Path]
-    """Scene folder; it is copied, not changed."""
-    seconds: float = 8.0
-    """How long the mouse drags."""
+    scenes: tyro.conf.Positional[list[Path]]
+    """Scene folders; they are copied, not changed."""
+    repeats: int = 5
+    kinds: tuple[Kind, ...] = ("continuous", "discrete")
+    empty_cache: bool = False
+    """Start each repetition without compiled kernels."""
+    source: Path | None = None
+    """Folder `src` of another version of cagefield, to compare with."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """File to write the table to, as well."""
+    pictures: Path | None = None
+    """Folder for screenshots of each whole and final picture of the last repetition."""
 
     def run(self) -> None:
         """Prints the table.
@@ -72,125 +93,172 @@ class EditorLatency:
         chromium = shutil.which("chromium") or shutil.which("google-chrome")
         if chromium is None:
             raise CagefieldError("no chromium on this machine; install it to measure the editor")
+        lines = [
+            "| scene, edit | drag | pictures a second | their width | first picture, ms | whole picture, ms |"
+            " final picture, ms |",
+            "| --- | --- |" + " --: |" * 5,
+        ]
+        print("\n".join(lines), flush=True)
+        for scene in self.scenes:
+            for kind in self.kinds:
+                with tempfile.TemporaryDirectory() as cache:
+                    runs = [self.once(scene, kind, Path(cache), chromium) for _ in range(self.repeats + 1)][
+                        1:
+                    ]
+                for number in range(DRAGS):
+                    lines.append(row(f"{scene.name}, {kind}", number, [drags[number] for drags in runs]))
+                    print(lines[-1], flush=True)
+        machine = f"{cpu_model()}, {devices.threads()} cores; page drawn in software, 1058x782"
+        command = "python -m benchmarks.editor_latency SCENE..." + (
+            " --empty-cache" if self.empty_cache else ""
+        )
+        notes = f"Medians of {self.repeats} fresh editors; longest in brackets. {machine}. `{command}`"
+        text = "\n".join(["# Latency of the first drags", "", *lines, "", notes, ""])
+        print(notes)
+        if self.out is not None:
+            self.out.write_text(text)
+
+    def once(self, scene: Path, kind: Kind, cache: Path, chromium: str) -> list[Drag]:
+        """The drags of one fresh editor; kernels stay in the `cache`, patches do not."""
+        for folder in cache.glob("cagefield" if self.empty_cache else "cagefield/patches"):
+            shutil.rmtree(folder)
+        environment = os.environ | {"XDG_CACHE_HOME": str(cache), "PYTHONUNBUFFERED": "1"}
+        if self.source is not None:
+            environment["PYTHONPATH"] = str(self.source)
         with tempfile.TemporaryDirectory() as scratch, sync_playwright() as playwright:
-            scene = Path(scratch) / "scene"
-            shutil.copytree(self.scene, scene)
+            copy = Path(scratch) / "scene"
+            shutil.copytree(scene, copy)
+            (copy / "edits.yaml").write_text("version: 1\nedits: []\n")
             server = subprocess.Popen(
-                [sys.executable, "-m", "cagefield", "view", str(scene), "--port", "0", "--no-browser"],
+                [sys.executable, "-m", "cagefield", "view", str(copy), "--port", "0", "--no-browser"],
                 stdout=subprocess.PIPE,
                 text=True,
+                env=environment,
             )
             browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
             try:
                 assert server.stdout is not None
                 link = re.search(r"http://\S+", server.stdout.readline())
                 if link is None:
-                    raise CagefieldError(f"cagefield view {self.scene} did not start")
-                page = browser.new_page(viewport={"width": 800, "height": 600})
-                page.goto(link.group(0))
-                table = measured(page, self.seconds)
+                    raise CagefieldError(f"cagefield view {scene} did not start")
+                page = browser.new_page(viewport={"width": WINDOW[0], "height": WINDOW[1]})
+                page.goto(link.group(0), wait_until="commit")
+                return [
+                    self.measure(page, f"{scene.name}_{kind}_{number}", number)
+                    for number in range(DRAGS)
+                    if number or open_cage(page, cage_file(copy, kind)) is None
+                ]
             finally:
                 browser.close()
                 server.terminate()
-                server.wait(10)
-        machine = f"{cpu_model()}, {devices.threads()} cores, pages drawn in software"
-        command = "python -m benchmarks.editor_latency SCENE"
-        text = f"# The editor's latency\n\n{table}\nMachine: {machine}. `{command}`\n"
-        print(text)
-        if self.out is not None:
-            self.out.write_text(text)
+                server.wait(60)
+
+    def measure(self, page: Page, name: str, number: int) -> Drag:
+        """One drag with the gizmo's z handle, up and down in turn, until its final picture is shown."""
+        direction = 1 - 2 * (number % 2)
+        grip = page.evaluate("cagefield.grip('Z')")
+        if grip is None:
+            raise CagefieldError("the gizmo's handle is out of view")
+        before = page.evaluate("cagefield.latency.presented.length")
+        began = page.evaluate("cagefield.latency.moves.length")
+        page.mouse.move(grip["x"], grip["y"])
+        page.mouse.down()
+        for n in range(1, MOVES + 1):
+            page.mouse.move(grip["x"], grip["y"] - direction * DRAG_PX * n / MOVES)
+            time.sleep(DRAG_SECONDS / MOVES)
+        let_go = float(page.evaluate("performance.now()"))
+        page.mouse.up()
+        if self.pictures is not None:
+            self.pictures.mkdir(parents=True, exist_ok=True)
+            until(page, f"({WHOLE})({let_go}) !== undefined")
+            page.screenshot(path=self.pictures / f"{name}_whole.png")
+        finals = f"cagefield.latency.presented.filter(p => p.final && p.drag === 0 && p.time > {let_go})"
+        until(page, f"cagefield.settled && {finals}.at(-1)?.revision === cagefield.now.state.revision")
+        final = page.evaluate(f"{finals}.at(-1)")
+        whole = page.evaluate(f"({WHOLE})({let_go})")
+        if self.pictures is not None:
+            page.screenshot(path=self.pictures / f"{name}_final.png")
+        shown = page.evaluate(f"cagefield.latency.presented.slice({before})")
+        moving = [p for p in shown if p["drag"] > 0 and p["seq"] > 0 and p["time"] < let_go]
+        moved = page.evaluate(f"cagefield.latency.moves.slice({began}).map(m => m.moved)")
+        return Drag(
+            len(moving),
+            int(np.median([p["fullWidth"] for p in moving])) if moving else 0,
+            moving[0]["time"] - moved[0] if moving else float("nan"),
+            (whole or final)["time"] - let_go,
+            final["time"] - let_go,
+        )
 
 
-def measured(page: Page, seconds: float) -> str:
-    """The table."""
-    until(page, "Boolean(window.cagefield && cagefield.now.state)")
+WHOLE = (
+    "t => cagefield.latency.presented.find(p => (p.whole ?? p.final) && p.drag === 0 && p.time > t"
+    " && p.revision === cagefield.now.state.revision)"
+)
+"""First whole picture after a time, whatever it lacks: a function of the page."""
+
+
+def open_cage(page: Page, edits: str) -> None:
+    """Adds the cage in an editor that has just shown its first whole picture, ready to be dragged."""
+    until(page, "Boolean(window.cagefield?.now?.state)")
     page.keyboard.press("n")
-    page.set_input_files(
-        "input[type=file]", {"name": "arm.yaml", "mimeType": "text/yaml", "buffer": EDITS.encode()}
-    )
+    until(page, "cagefield.settled")
+    content = {"name": "cage.json", "mimeType": "application/json", "buffer": edits.encode()}
+    page.set_input_files("input[type=file]", content)
     until(page, "cagefield.now.state.edits.length === 1 && cagefield.now.state.selected !== null")
     page.click(".tools .mode-edit")
-    settle(page)
-    drag(page, 1.0)  # kernels compile, rates are measured
-    settle(page)
-    first = page.evaluate("cagefield.latency.moves.length")
-    shown = page.evaluate("cagefield.latency.presented.length")
-    drag(page, seconds)
-    moves = page.evaluate(f"cagefield.latency.moves.slice({first})")
-    pictures = page.evaluate(f"cagefield.latency.presented.slice({shown}).filter(p => p.drag > 0)")
-    settle(page)
-    page.set_viewport_size({"width": 800 + FRAME[0], "height": 800 + FRAME[1]})
-    until(page, "cagefield.picture.full_width === 800 && cagefield.picture.full_height === 800")
-    settle(page)
-    lets_go = []
-    for _ in range(3):
-        let_go = drag(page, 1.0)
-        finals = f"cagefield.latency.presented.filter(p => p.final && p.drag === 0 && p.time > {let_go})"
-        until(page, f"{finals}.length > 0")
-        final = page.evaluate(f"{finals}[0]")
-        settle(page)
-        assert final["fullWidth"] == 800, final
-        lets_go.append(final["time"] - let_go)
-    return rows(moves, pictures, lets_go)
+    until(page, "cagefield.grip('Z') !== null")
 
 
-def rows(moves: list[dict[str, Any]], pictures: list[dict[str, Any]], lets_go: list[float]) -> str:
-    """The table of what was measured, milliseconds."""
-    lines = np.array([m["lines"] - m["moved"] for m in moves if m["lines"] is not None])
-    seen = [m for m in moves if m["presented"] is not None]
-    if len(seen) < 2:
-        raise CagefieldError("no picture came during the drag")
-
-    def column(after: str, before: str) -> np.ndarray[Any, Any]:
-        return np.array([m[after] - m[before] for m in seen])
-
-    whole = column("presented", "moved")
-    render, encode = (np.array([m[key] for m in seen]) for key in ("renderMs", "encodeMs"))
-    decode, present = column("decoded", "received"), column("presented", "decoded")
-    rest = whole - render - encode - decode - present
-    span = (pictures[-1]["time"] - pictures[0]["time"]) / 1000
-    table = [
-        f"{len(moves)} moves, {len(seen)} pictures of {int(np.median([m['width'] for m in seen]))} pixels"
-        f" width (median), {(len(pictures) - 1) / span:.1f} a second",
-        "",
-        "| milliseconds | median | 90% |",
-        "| --- | --: | --: |",
-        row("mouse move to presented cage lines", lines),
-        row("mouse move to presented picture", whole),
-        row("... server: rendering, map and occupancy", render),
-        row("... server: encoding", encode),
-        row("... page: decoding", decode),
-        row("... page: drawing, to the beginning of the next frame", present),
-        row("... between: socket, pacing, waiting for the picture before", rest),
-        row("letting go to the whole 800x800 picture", np.array(lets_go)),
-    ]
-    return "\n".join(table) + "\n"
+def cage_file(folder: Path, kind: Kind) -> str:
+    """An edit file: a cage that holds the middle of the content, half as large as half of the content."""
+    middle, extent = content_extent(folder)
+    edit: dict[str, Any] = {
+        "name": "cage",
+        "inner": {"center": middle.tolist(), "size": (0.5 * extent).tolist()},
+        "adjustment": kind,
+    }
+    if kind == "continuous":
+        edit["outer"] = {"margin": (0.25 * extent).tolist()}
+    return json.dumps({"version": 1, "edits": [edit]})
 
 
-def row(name: str, values: np.ndarray[Any, Any]) -> str:
-    return f"| {name} | {np.median(values):.0f} | {np.percentile(values, 90):.0f} |"
+def content_extent(folder: Path) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+    """(median [3], interquartile range [3]) of the positions of a scene's content, world units.
+
+    Raises:
+        CagefieldError: the scene's field is neither splats nor voxels.
+    """
+    content = Scene.open(folder).field
+    if isinstance(content, SplatField):
+        points = content.means[content.opacities > 0.5]
+    elif isinstance(content, VoxelField):
+        lower, upper = content.bounds
+        points = np.random.default_rng(0).uniform(lower, upper, (200_000, 3)).astype(np.float32)
+        sigma, _ = content(points, np.broadcast_to(np.float32([1, 0, 0]), points.shape))
+        points = points[sigma * content.sample_spacing > 0.5]
+    else:
+        raise CagefieldError(f"{folder}: the editor's latency is measured on splats and voxels")
+    low, middle, high = np.quantile(points.astype(np.float64), [0.25, 0.5, 0.75], axis=0)
+    return middle, high - low
 
 
-def drag(page: Page, seconds: float) -> float:
-    """Drags the gizmo's z handle up and down; the page's time just before it lets go."""
-    grip = page.evaluate("cagefield.grip('Z')")
-    page.mouse.move(grip["x"], grip["y"])
-    page.mouse.down()
-    start = time.monotonic()
-    while (t := time.monotonic() - start) < seconds:
-        page.mouse.move(grip["x"], grip["y"] - 40 * (1 - math.cos(3.0 * t)) / 2)
-        time.sleep(0.012)
-    let_go = float(page.evaluate("performance.now()"))
-    page.mouse.up()
-    return let_go
+def row(name: str, number: int, drags: list[Drag]) -> str:
+    """One drag's line of the table."""
 
+    def cell(values: list[float]) -> str:
+        if np.isnan(values).any():
+            return f"none in {int(np.isnan(values).sum())} of {len(values)}"
+        return f"{np.median(values):.0f} ({max(values):.0f})"
 
-def settle(page: Page) -> None:
-    """Waits for the whole picture of the last edit."""
-    until(page, "cagefield.settled && cagefield.picture.revision === cagefield.now.state.revision")
+    rate = np.median([drag.pictures for drag in drags]) / DRAG_SECONDS
+    width = np.median([drag.width for drag in drags])
+    cells = [f"{rate:.1f}", f"{width:.0f}"]
+    cells += [cell([getattr(drag, stage) for drag in drags]) for stage in ("first", "whole", "final")]
+    return f"| {name} | {('first', 'second', 'third')[number]} | {' | '.join(cells)} |"
 
 
 def until(page: Page, condition: str) -> None:
+    """Waits for a condition of the page."""
     end = time.monotonic() + PATIENCE
     while not page.evaluate(condition):
         if time.monotonic() > end:
@@ -199,4 +267,5 @@ def until(page: Page, condition: str) -> None:
 
 
 if __name__ == "__main__":
+    print(f"cagefield {cagefield.__version__}")
     tyro.cli(EditorLatency).run()

@@ -12,7 +12,7 @@ from scipy import ndimage
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion.continuous_relighting import relight_voxels
 from cagefield.completion.lighting.ambient_occlusion import LightModel
-from cagefield.completion.patcher import Patcher
+from cagefield.completion.patcher import Patcher, PatchStage
 from cagefield.completion.splat_patch import relight_splats
 from cagefield.completion.surfaces.grid_block import extract_block
 from cagefield.edits import Edit, EditStack, PreparedEdit, PreparedStack
@@ -161,7 +161,7 @@ def test_patchers_put_the_light_before_its_edit(kind: str):
     assert light is prepared.light and light.patch is not None and light.edit.changes_anything
     assert patcher.prepare([edit])[0].light is light
     bare = (PreparedEdit(edit),)
-    assert tuple(patcher.prepare([edit], moving=True)) == bare
+    assert tuple(patcher.prepare([edit], stage=PatchStage.INPAINTED)) == bare
     assert tuple(patcher.prepare([edit], relight_continuous=False)) == bare
     unlit = edit.replace(relight="none")
     assert tuple(patcher.prepare([unlit])) == (PreparedEdit(unlit),)

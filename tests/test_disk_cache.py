@@ -18,7 +18,7 @@ from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.lighting.diffuse_irradiance import DiffuseLight
 from cagefield.completion.lighting.directional_light import DirectionalLight
 from cagefield.completion.patch_cache import DiskCache
-from cagefield.completion.patcher import Patcher
+from cagefield.completion.patcher import Patcher, PatchStage
 from cagefield.edits import Edit, EditStack, PreparedEdit
 from cagefield.edits.patch import NewLight, Patch, SplatPatch
 from cagefield.fields.voxel_field import VoxelField
@@ -110,7 +110,7 @@ def test_a_drag_after_opening_is_as_one_before(folder: Path) -> None:
         field = room()
         patcher = Patcher(field, CAMERAS, Counted(field))
         patcher.prepare([MOVE])
-        found.append(arrays_of(patcher.prepare(further, moving=True)))
+        found.append(arrays_of(patcher.prepare(further, stage=PatchStage.INPAINTED)))
     for left, right in zip(*found, strict=True):
         np.testing.assert_array_equal(left, right)
 
@@ -119,10 +119,10 @@ def test_a_drag_before_anything_is_known_is_made_again_when_it_ends() -> None:
     edit = [Edit.delete(MOVE.inner).replace(relight="none", feather=0.0)]
     field = room()
     patcher = Patcher(field, CAMERAS, Counted(field))
-    moving = patcher.prepare(edit, moving=True).edits[0].patch
+    moving = patcher.prepare(edit, stage=PatchStage.INPAINTED).edits[0].patch
     settled = patcher.prepare(edit).edits[0].patch
     assert moving is not None and settled is not None and settled is not moving
-    assert patcher.prepare(edit, moving=True).edits[0].patch is settled
+    assert patcher.prepare(edit, stage=PatchStage.INPAINTED).edits[0].patch is settled
 
 
 def test_splats_have_the_same_patches_again() -> None:
@@ -150,7 +150,7 @@ def test_splats_have_the_same_patches_again() -> None:
 
 
 def test_what_moves_is_not_kept(folder: Path) -> None:
-    patched([MOVE], moving=True)
+    patched([MOVE], stage=PatchStage.INPAINTED)
     assert not folder.exists()
 
 

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion.pasting.paste_content import content_box
+from cagefield.completion.patcher import PatchStage
 from cagefield.completion.surfaces.grid_block import extract_block
 from cagefield.edits import Edit, EditStack, PreparedStack, dump_edits, parse_edits
 from cagefield.edits.operations import Rotate, Scale
@@ -127,9 +128,13 @@ def test_what_the_cage_covers_is_seen_beside_the_thing(folder: Path, kept: bool)
     assert db(found.rgb, truth.rgb) > 38.0 and db(found.opacity, truth.opacity) > 38.0
     # While it is dragged, its cage is all its own; what it was put over before is known.
     patcher = scene.patcher
-    (dragged,) = patcher.prepare([edit.translate((0.1, 0.0, 0.0))], moving=True, preserve_opacity=kept)
-    (again,) = patcher.prepare([edit.translate((0.2, 0.0, 0.0))], moving=True, preserve_opacity=kept)
-    (still,) = patcher.prepare([edit], moving=True, preserve_opacity=kept)
+    (dragged,) = patcher.prepare(
+        [edit.translate((0.1, 0.0, 0.0))], stage=PatchStage.INPAINTED, preserve_opacity=kept
+    )
+    (again,) = patcher.prepare(
+        [edit.translate((0.2, 0.0, 0.0))], stage=PatchStage.INPAINTED, preserve_opacity=kept
+    )
+    (still,) = patcher.prepare([edit], stage=PatchStage.INPAINTED, preserve_opacity=kept)
     (settled,) = patcher.prepare([edit], preserve_opacity=kept)
     assert dragged.part is again.part and settled.part is not dragged.part
     assert still.part is not None and (still.part is settled.part or still.part is dragged.part)
@@ -228,7 +233,7 @@ def test_surroundings_get_a_shadow(tmp_path: Path) -> None:
     assert pictures["occlusion", -0.29] < 0.85 * pictures["none", -0.29]
     assert abs(pictures["occlusion", 0.8] - pictures["none", 0.8]) < 0.01
     # While it is dragged it casts none, and keeps what it shows.
-    (moving,) = scene.patcher.prepare([edit], moving=True)
+    (moving,) = scene.patcher.prepare([edit], stage=PatchStage.INPAINTED)
     (settled,) = scene.patcher.prepare([edit])
     assert moving.under is None and settled.under is not None
 

@@ -15,7 +15,7 @@ from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion.discrete_patch import build_patch
 from cagefield.completion.inpainting.support_inpainting import solve_membrane
 from cagefield.completion.lighting.ambient_occlusion import LightModel
-from cagefield.completion.patcher import needs_patch
+from cagefield.completion.patcher import PatchStage, needs_patch
 from cagefield.completion.surfaces.footprint import Footprint
 from cagefield.completion.surfaces.grid_block import extract_block, interpolate_field
 from cagefield.completion.surfaces.support_plane import Support
@@ -180,7 +180,7 @@ def test_patches_are_kept_while_a_cage_is_dragged(scenes: tuple[Scene, Scene]) -
     scene, _ = scenes
     edit = Edit.move(cage()).translate((-0.5, 0.0, 0.0))
     further = edit.translate((-0.2, 0.0, 0.0))
-    first, second = (scene.patcher.prepare([e], moving=True)[0].patch for e in (edit, further))
+    first, second = (scene.patcher.prepare([e], stage=PatchStage.INPAINTED)[0].patch for e in (edit, further))
     assert first is second and first is not None and first.part is None
     settled = scene.patcher.prepare([further])[0].patch
     assert settled is not first and settled is not None and settled.part is not None

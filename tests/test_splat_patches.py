@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion.continuous_relighting import light_edit
 from cagefield.completion.lighting.ambient_occlusion import LightModel
-from cagefield.completion.patcher import Patcher
+from cagefield.completion.patcher import Patcher, PatchStage
 from cagefield.completion.splat_patch import build_splat_patch
 from cagefield.completion.surfaces.splat_voxelization import voxelize_splats
 from cagefield.edits import Edit, EditStack, PreparedEdit, PreparedStack
@@ -206,7 +206,7 @@ def test_scenes_fill_and_relight_splats_unless_told_not_to():
     (kept,) = scene.with_edits(EditStack([edit.replace(fill="none", relight="none")])).prepared_edits
     assert kept.patch is None
     patcher = Patcher(field, cameras(), lambda camera: pytest.fail("a drag found out about the light"))
-    (moving,) = patcher.prepare([edit], moving=True)
+    (moving,) = patcher.prepare([edit], stage=PatchStage.INPAINTED)
     assert isinstance(moving.patch, SplatPatch) and moving.patch.part is None
     # Without light a patch does not depend on where the part is put down.
     move = Edit.move(cage(), relight="none").translate((0.5, 0.0, 0.0))

@@ -19,6 +19,8 @@ export const PICTURE: PictureHeader = {
   height: 1,
   full_width: 1,
   full_height: 1,
+  whole: true,
+  refinement: 3,
   final: true,
   format: "rgb",
   picture_bytes: 3,

@@ -288,6 +288,7 @@ describe("latency", () => {
       revision: 1,
       width: 100,
       fullWidth: 100,
+      whole: false,
       final: false,
     };
     latency.addPresented(picture, 150, 160, 20, 2);
@@ -306,7 +307,7 @@ describe("latency", () => {
     const latency = new Latency();
     for (let time = 0; time <= 1000; time += 100) {
       latency.addPresented(
-        { time, drag: 0, seq: 0, camera: 1, revision: 1, width: 1, fullWidth: 1, final: false },
+        { time, drag: 0, seq: 0, camera: 1, revision: 1, width: 1, fullWidth: 1, whole: false, final: false },
         0,
         0,
         0,

@@ -19,6 +19,8 @@ const HEADER: PictureHeader = {
   height: 2,
   full_width: 4,
   full_height: 2,
+  whole: false,
+  refinement: 0,
   final: false,
   format: "jpeg",
   picture_bytes: 3,

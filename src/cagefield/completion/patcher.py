@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from enum import IntEnum
 from functools import cached_property
 from typing import cast
 
@@ -24,6 +25,7 @@ from cagefield.completion.splat_patch import build_splat_patch, relight_splats
 from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.splat_voxelization import voxelize_bounds
 from cagefield.completion.surfaces.visibility import CameraVisibility, render_visibility
+from cagefield.compute.cancellation import cancellable, check_cancelled
 from cagefield.edits import Continuous, Delete, Discrete, Edit, Paste, PreparedEdit, PreparedStack
 from cagefield.edits.options import CastShadow
 from cagefield.edits.patch import Pasted, Patch, SplatPatch
@@ -35,6 +37,19 @@ MAX_CACHED_PATCHES = 16
 """Maximum number of patches in memory."""
 
 Key = tuple[object, ...]
+
+
+class PatchStage(IntEnum):
+    """Stages of the patches of a stack, each with all of those before.
+
+    CACHED: patches in the cache alone, none is computed. INPAINTED: holes are inpainted, without the light at
+    the destination of a discrete edit and that of a continuous one, so that no patch depends on where an
+    edit takes its content. LIT: light, feathered seams.
+    """
+
+    CACHED = 0
+    INPAINTED = 1
+    LIT = 2
 
 
 class Patcher:
@@ -62,7 +77,7 @@ class Patcher:
         self,
         edits: Sequence[Edit],
         *,
-        moving: bool = False,
+        stage: PatchStage = PatchStage.LIT,
         relight_continuous: bool = True,
         preserve_opacity: bool = True,
         proceed: Callable[[], None] | None = None,
@@ -70,51 +85,71 @@ class Patcher:
         """Stack of the edits, in order, with their patches and the content of their pastes.
 
         A continuous edit that relights has the change of its light (`completion.continuous_relighting`),
-        except while `moving` or with `relight_continuous` False.
-
-        While an edit is `moving` its patch omits the part's shadow at the destination and so does not
-        depend on the destination; an edit that stays meanwhile keeps its patch. `proceed` is called between
-        patches, and may raise to cancel.
+        except below stage LIT or with `relight_continuous` False. An edit whose patch of a later `stage` is
+        cached has that one. `proceed` is called between patches and their parts, and may raise to cancel.
 
         Raises `EditError` for a paste whose scene is missing or cannot be pasted.
         """
-        prepared: list[PreparedEdit] = []
-        feathers, relights = isinstance(self._field, VoxelField), relight_continuous and not moving
-        ready = [PreparedEdit(edit) for edit in edits]
-        if self._pastes is not None:
-            ready = self._pastes.read(edits, self._field, preserve_opacity=preserve_opacity, proceed=proceed)
-        for step in ready:
-            edit, below = step.edit, PreparedStack(prepared)
-            if isinstance(edit, Paste) and step.pasted is not None and isinstance(self._field, VoxelField):
-                if proceed is not None:
-                    proceed()
-                composite = self._composite(below, edit, step.pasted, moving, preserve_opacity)
-                step = replace(step, pasted=composite)
-            if isinstance(edit, Discrete) and needs_patch(edit, feathers=feathers):
-                if proceed is not None:
-                    proceed()
-                patch = self._patch(below, edit, step.pasted, moving, preserve_opacity)
-                step = replace(step, patch=patch)
-            elif relights and isinstance(edit, Continuous) and needs_relighting(edit):
-                if proceed is not None:
-                    proceed()
-                step = replace(step, light=self._build_light(below, edit))
-            prepared.append(step)
+        with cancellable(proceed):
+            ready = [PreparedEdit(edit) for edit in edits]
+            if self._pastes is not None:
+                ready = self._pastes.read(
+                    edits, self._field, preserve_opacity=preserve_opacity, proceed=proceed
+                )
+            prepared: list[PreparedEdit] = []
+            for step in ready:
+                check_cancelled()
+                below = PreparedStack(prepared)
+                prepared.append(self._prepare(step, below, stage, relight_continuous, preserve_opacity))
         while len(self._composites) > max(MAX_CACHED_PATCHES, len(prepared)):
             self._composites.popitem(last=False)
         return PreparedStack(prepared)
 
-    def _composite(
-        self, below: PreparedStack, edit: Paste, pasted: Pasted, moving: bool, preserve_opacity: bool
-    ) -> Pasted:
-        """Content of a paste, composited with the field beneath.
+    def _prepare(
+        self,
+        step: PreparedEdit,
+        below: PreparedStack,
+        stage: PatchStage,
+        relight_continuous: bool,
+        preserve_opacity: bool,
+    ) -> PreparedEdit:
+        """One edit with its patch, above those below; arguments as in `prepare`."""
+        edit, is_voxels = step.edit, isinstance(self._field, VoxelField)
+        if isinstance(edit, Paste) and step.pasted is not None and is_voxels:
+            step = replace(step, pasted=self._composite(below, edit, step.pasted, stage, preserve_opacity))
+        if isinstance(edit, Discrete) and needs_patch(edit, feathers=is_voxels):
+            return replace(step, patch=self._patch(below, edit, step.pasted, stage, preserve_opacity))
+        if relight_continuous and isinstance(edit, Continuous) and needs_relighting(edit):
+            return replace(step, light=self._build_light(below, edit, stage))
+        return step
 
-        While the paste moves, its content alone, unless the composite is cached.
-        """
+    def attained_stage(self, edits: Sequence[Edit]) -> PatchStage:
+        """Last stage whose patches are those of stage CACHED, whatever the cache holds: LIT without any."""
+        is_voxels = isinstance(self._field, VoxelField)
+        known_dark = "light_model" in self.__dict__ and not self.light_model.has_effect
+        attained = PatchStage.LIT
+        for edit in edits:
+            if isinstance(edit, Paste) and is_voxels and edit.enabled:
+                attained = min(attained, PatchStage.INPAINTED)  # composited with the field beneath
+            if needs_patch(edit, feathers=is_voxels):
+                return PatchStage.CACHED
+            if needs_relighting(edit) and not (known_dark and edit.relight == "occlusion"):
+                attained = min(attained, PatchStage.INPAINTED)
+        return attained
+
+    def warm(self, proceed: Callable[[], None] | None = None) -> None:
+        """Compute the visibility and the light model, which depend on the field alone; `proceed` cancels."""
+        with cancellable(proceed):
+            _ = self.light_model
+
+    def _composite(
+        self, below: PreparedStack, edit: Paste, pasted: Pasted, stage: PatchStage, preserve_opacity: bool
+    ) -> Pasted:
+        """Content of a paste, composited with the field beneath; below stage LIT alone, unless that is cached."""
         assert isinstance(self._field, VoxelField)  # splats need no compositing
         key: Key = (*below.steps, pasted, edit.deformed, preserve_opacity)
         if key not in self._composites:
-            if moving:
+            if stage < PatchStage.LIT:
                 return pasted
             self._composites[key] = composite_paste(
                 self._field, below, edit, pasted, preserve_opacity=preserve_opacity
@@ -125,7 +160,7 @@ class Patcher:
     @cached_property
     def light_model(self) -> LightModel:
         """Light model of the field: openness and diffuse term."""
-        # Computed first: a cached light model implies a cached visibility, and drags wait for neither.
+        # Computed first: a known light model implies known visibility.
         visibility = self._visibility
         return self._disk_cache.get_or_make(
             ("light_model",),
@@ -150,6 +185,13 @@ class Patcher:
             )
         return self._directional_models[direction]
 
+    def _is_model_known(self, edit: Edit) -> bool:
+        """Whether `_model_for` an edit computes nothing."""
+        if edit.relight in ("none", "occlusion"):
+            return edit.relight == "none" or "light_model" in self.__dict__
+        direction = edit.relight.direction if isinstance(edit.relight, CastShadow) else None
+        return direction in self._directional_models
+
     @cached_property
     def _voxel_field(self) -> VoxelField:
         """Voxel field, or splats voxelized at the resolution of the fit of a light model."""
@@ -167,30 +209,34 @@ class Patcher:
         below: PreparedStack,
         edit: Discrete,
         pasted: Pasted | None,
-        moving: bool,
+        stage: PatchStage,
         preserve_opacity: bool,
     ) -> Patch | SplatPatch | None:
-        """Patch of a discrete edit; None for an edit that needs none while it moves."""
-        # A drag does not wait for the fit of the light model.
-        model_known = not moving or "light_model" in self.__dict__
-        model_or_none = self._model_for(edit) if model_known else None
+        """Patch of a discrete edit; None for an edit without one at a stage."""
+        is_voxels = isinstance(self._field, VoxelField)
+        is_lit = stage is PatchStage.LIT
+        model_or_none = self._model_for(edit) if is_lit or self._is_model_known(edit) else None
         has_light = model_or_none is not None and model_or_none.has_effect
         if isinstance(edit, Paste) and not has_light:
             return None
-        feather = edit.feather if isinstance(self._field, VoxelField) else 0.0
+        feather = edit.feather if is_voxels else 0.0
         kind = type(edit), edit.fill, feather, pasted, preserve_opacity
         base_key: Key = (*below.steps, edit.inner, *kind, has_light and edit.relight)
         final_key: Key = (*base_key, edit.deformed if has_light or feather > 0.0 else None)
-        key: Key = (*base_key, "moving") if moving and final_key not in self._cache else final_key
-        if key in self._cache:
-            self._cache.move_to_end(key)
-            return cast("Patch | SplatPatch", self._cache[key])
-        if not needs_patch(edit, moving, feathers=isinstance(self._field, VoxelField)):
+        moving_key: Key = (*base_key, "moving")
+        unlit_key: Key = (*below.steps, edit.inner, *kind, False, "moving")
+        for key in (final_key,) if is_lit else (final_key, moving_key):
+            if key in self._cache:
+                self._cache.move_to_end(key)
+                return cast("Patch | SplatPatch", self._cache[key])
+        if stage is PatchStage.CACHED:
+            return cast("Patch | SplatPatch | None", self._cache.get(unlit_key))
+        if not needs_patch(edit, not is_lit, feathers=is_voxels):
             return None
         model = model_or_none if has_light else None
         needs_visibility = has_light or (edit.fill == "surroundings" and edit.uncovers)
         visibility = (
-            self._visibility if needs_visibility and (not moving or "_visibility" in self.__dict__) else None
+            self._visibility if needs_visibility and (is_lit or "_visibility" in self.__dict__) else None
         )
 
         def make() -> Patch | SplatPatch:
@@ -200,7 +246,7 @@ class Patcher:
                     below,
                     edit,
                     model,
-                    include_destination=not moving,
+                    include_destination=is_lit,
                     visibility=visibility,
                     preserve_opacity=preserve_opacity,
                     pasted=pasted,
@@ -210,18 +256,20 @@ class Patcher:
                 below,
                 edit,
                 model,
-                include_destination=not moving,
+                include_destination=is_lit,
                 visibility=visibility,
                 pasted=pasted,
             )
 
         inputs = ("patch", model, *below.steps, edit, preserve_opacity)
-        patch = make() if moving else self._disk_cache.get_or_make(inputs, make)
-        self._store(key, patch)
+        patch = self._disk_cache.get_or_make(inputs, make) if is_lit else make()
+        self._store(final_key if is_lit else moving_key, patch)
         return patch
 
-    def _build_light(self, below: PreparedStack, edit: Continuous) -> PreparedEdit | None:
-        """Edit that changes the light under a continuous one; None if no light changes."""
+    def _build_light(self, below: PreparedStack, edit: Continuous, stage: PatchStage) -> PreparedEdit | None:
+        """Edit that changes the light under a continuous one; None if no light changes, or none is known."""
+        if stage < PatchStage.LIT:
+            return None
         model = self._model_for(edit)
         if model is None or not model.has_effect:
             return None

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.cameras.keyframes import Keyframe, Timeline
-from cagefield.completion.patcher import Patcher
+from cagefield.completion.patcher import Patcher, PatchStage
 from cagefield.edits import Continuous, Delete, EditStack, PreparedEdit, PreparedStack
 from cagefield.edits.partial_edit import partial_edit
 from cagefield.edits.patch import Patch, SplatPatch
@@ -80,7 +80,7 @@ def path_edits(
     if times is None:
         return None
     kept = renderer.preserve_opacity
-    on_way = for_pages(patcher.prepare(edits.edits, moving=True, preserve_opacity=kept))
+    on_way = for_pages(patcher.prepare(edits.edits, stage=PatchStage.INPAINTED, preserve_opacity=kept))
     whole = for_pages(patcher.prepare(edits.edits, preserve_opacity=kept, relight_continuous=False))
     knots = [parts_at(line, edits, t) for t in times]
     unique = list(dict.fromkeys(knots))

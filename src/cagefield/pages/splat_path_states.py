@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.cameras.keyframes import Keyframe, Timeline
-from cagefield.completion.patcher import Patcher
+from cagefield.completion.patcher import Patcher, PatchStage
 from cagefield.edits import EditStack, PreparedStack
 from cagefield.fields.splat_field import SplatField
 from cagefield.pages.page_splat_path import SPLAT_BYTES, SplatPathState, encode_page_splat_path
@@ -38,7 +38,7 @@ def splat_path_edits(
     if len(keys) < 2:
         return None
 
-    on_way = patcher.prepare(edits.edits, moving=True)
+    on_way = patcher.prepare(edits.edits, stage=PatchStage.INPAINTED)
     whole = patcher.prepare(edits.edits, relight_continuous=False)
     # With all that is pasted, also in states without it.
     field = with_pasted(field, whole)

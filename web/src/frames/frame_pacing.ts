@@ -178,9 +178,9 @@ export class FramePacer {
   /** Records the latency and the figures of a frame that is on the screen. */
   private record({ header, received, decoded }: ReceivedFrame): void {
     const time = performance.now();
-    const { drag, seq, camera, revision, width, full_width, full_height, final } = header;
+    const { drag, seq, camera, revision, width, full_width, full_height, whole, final } = header;
     const { render_ms: renderMs, encode_ms: encodeMs } = header;
-    const presented = { time, drag, seq, camera, revision, width, fullWidth: full_width, final };
+    const presented = { time, drag, seq, camera, revision, width, fullWidth: full_width, whole, final };
     this.latency.addPresented(presented, received, decoded, renderMs, encodeMs);
     const figures: Figures = {
       perSecond: this.latency.frameRate(time),

@@ -105,6 +105,8 @@ export function ownHeader(
     height,
     full_width: width,
     full_height: height,
+    whole: complete,
+    refinement: final ? 3 : 0,
     final,
     format: "rgb",
     picture_bytes: 0,

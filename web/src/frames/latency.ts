@@ -23,6 +23,8 @@ export interface Presented {
   revision: number;
   width: number;
   fullWidth: number;
+  /** Whether it completes a whole picture, and whether nothing refines that. */
+  whole: boolean;
   final: boolean;
 }
 

@@ -535,6 +535,8 @@ export interface PictureHeader {
   height: number;
   full_width: number;
   full_height: number;
+  whole: boolean;
+  refinement: number;
   final: boolean;
   format: "jpeg" | "rgb";
   picture_bytes: number;

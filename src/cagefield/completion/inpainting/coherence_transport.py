@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.typing import Array, Mask
 
 COLOR_DEVIATION_COLUMNS = 0.8
@@ -48,6 +49,7 @@ def estimate_orientation(
     values: Array, given: Mask, span: Callable[[Mask, Array], Array]
 ) -> TextureOrientation:
     """Orientation of the texture of values [U,V] given on a mask [U,V], extended by a membrane `span`."""
+    check_cancelled()
     smooth = smooth_columns(values[..., None], given)[..., 0]
     slope = np.stack([np.gradient(smooth, axis=axis) for axis in (0, 1)], axis=-1)
     interior = ndimage.binary_erosion(given, np.ones((3, 3), bool))
@@ -85,6 +87,7 @@ def transport_colors(
 
     unknown, given: masks [U,V]; table [U*V,C]: values.
     """
+    check_cancelled()
     start = np.argwhere(unknown)
     max_length = MAX_LINE_HOLE_SIZES * (np.sqrt(len(start)) + 1.0)
     lines = [_trace_lines(start, sign, given, orientation, max_length) for sign in (1.0, -1.0)]
@@ -111,6 +114,7 @@ def _trace_lines(
     start: NDArray[np.int64], sign: float, given: Mask, orientation: TextureOrientation, max_length: float
 ) -> _Lines:
     """Lines from columns [M,2] along a sign of the orientation to the given columns [U,V]."""
+    check_cancelled()
     positions, heading = start.astype(np.float64), sign * orientation.direction[tuple(start.T)]
     length, active = np.full(len(start), np.inf), np.arange(len(start))
     for number in range(int(max_length / LINE_STEP_COLUMNS)):

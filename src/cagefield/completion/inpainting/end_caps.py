@@ -17,6 +17,7 @@ from cagefield.completion.surfaces.patch_bounds import SUPPORT_DISTANCE_VOXELS
 from cagefield.completion.surfaces.support_plane import find_support
 from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.completion.surfaces.visibility import CameraVisibility
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.edits import EditMap
 from cagefield.typing import Mask
 
@@ -37,6 +38,7 @@ def close_cut_end(
     block: in its new light; inside [X,Y,Z]: mask of V^c; part: surfels of the part; light: change of light
     on the part; visibility: visible surfaces of the field without edits.
     """
+    check_cancelled()
     holder = block.solid & ~inside
     holder &= ndimage.binary_dilation(block.solid & inside, iterations=TOUCH_DISTANCE_VERTICES)
     if not holder.any() or not len(part.points):

@@ -18,6 +18,7 @@ from scipy import ndimage
 from scipy.linalg import eigh
 
 from cagefield.completion.inpainting.coherence_transport import smooth_columns
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.typing import Array, Mask
 
 PATCH_HALF_WIDTH = 4
@@ -126,6 +127,7 @@ def _complete_level(
 
     The initial colors with weight 0 where fewer than MIN_KNOWN_PATCHES patches are given.
     """
+    check_cancelled()
     width = np.ones((2 * PATCH_HALF_WIDTH + 1,) * 2, bool)
     known_columns = np.argwhere(ndimage.binary_erosion(level.given, width))
     columns = np.argwhere(ndimage.binary_dilation(level.hole, width) & (level.given | level.hole))
@@ -160,6 +162,7 @@ def _texture_weight(level: _Level, columns: NDArray[np.int64], difference: Array
 
     difference [N]: relative difference of the patches around columns [N,2] from their matches.
     """
+    check_cancelled()
     is_given = level.given[tuple(columns.T)]
     unknown, weight = np.ones(level.given.shape, bool), np.zeros(level.given.shape)
     unknown[tuple(columns[is_given].T)] = False
@@ -238,6 +241,7 @@ def _match_patches(
 
     columns [N,2]: centers of the patches.
     """
+    check_cancelled()
     rows, distance = np.zeros(len(columns), np.int64), np.zeros(len(columns))
     squared_norm, padded = (descriptors**2).sum(axis=1), _pad_edges(image)
     for first in range(0, len(columns), PATCHES_PER_BATCH):
@@ -262,6 +266,7 @@ def _blend_patches(
 
     Patch `nearest` [N] of patches [M,K,C] lies at columns [N,2] with a weight [N].
     """
+    check_cancelled()
     offsets, window_weight = _window()
     size = shape[0] * shape[1]
     sums, total = np.zeros((size, shape[2])), np.zeros(size)

@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 from cagefield.completion.surfaces.footprint import MAX_SPLINE_KNOTS
 from cagefield.completion.surfaces.grid_block import GridBlock, interpolate_field, world_positions
 from cagefield.completion.surfaces.support_plane import Support
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.edits.patch import NewLight, SplatPatch
 from cagefield.fields.sh import C0
 from cagefield.fields.splat_field import SplatField
@@ -88,6 +89,7 @@ class KnownSplats:
         cls, field: SplatField, splats: SplatField, grid: VoxelField, moved: MovedSplats
     ) -> KnownSplats:
         """Splats of a field that some edits moved, in `splats`, and stayed."""
+        check_cancelled()
         still = np.flatnonzero(~moved.left)
         gains = np.ones((len(moved.source), 3)) if moved.gains is None else moved.gains
         return cls(
@@ -102,6 +104,7 @@ class KnownSplats:
         self, under: GridBlock, is_new: Mask, region: Cage, inner: Cage, support: Support
     ) -> NewSplats:
         """New splats on the upper side of an inpainted support, at the new vertices [X,Y,Z] of a block."""
+        check_cancelled()
         coordinates, normals = _upper_surface(under, is_new, support.normal)
         candidates = self._flat_neighbors(under, region, inner, is_new, support.normal)
         if not len(coordinates) or not len(candidates):
@@ -147,6 +150,7 @@ class KnownSplats:
 
         Copied splats are nearest in color to [A,3], with little view dependence.
         """
+        check_cancelled()
         splat_log, target_log = (
             np.log(np.maximum(rgb, MIN_DIVISOR_COLOR)) for rgb in (self.mean_colors(rows), colors)
         )
@@ -210,6 +214,7 @@ class KnownSplats:
         new: NewSplats,
     ) -> SplatPatch:
         """Patch with new splats; other arguments as in `SplatPatch`."""
+        check_cancelled()
         rows, points, shapes, colors = new
         gains = self.gains[rows] * colors / np.maximum(self.mean_colors(rows), MIN_DIVISOR_COLOR)
         return SplatPatch(

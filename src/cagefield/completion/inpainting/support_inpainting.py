@@ -19,6 +19,7 @@ from cagefield.completion.inpainting.coherence_transport import estimate_orienta
 from cagefield.completion.inpainting.exemplar_inpainting import inpaint_texture
 from cagefield.completion.surfaces.footprint import MAX_SUPPORT_HEIGHT_VOXELS, Footprint
 from cagefield.completion.surfaces.grid_block import GridBlock
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.fields.sh import sh_basis
 from cagefield.typing import AnyArray, Array, Float32, Mask
 
@@ -66,6 +67,7 @@ def inpaint_support(
 
     removed [X,Y,Z]: mask of V^c. With `keep_removed`, beneath a continuous edit, no vertex of V^c changes.
     """
+    check_cancelled()
     vertices = np.argwhere(np.ones(block.shape, bool))
     u, v, height = footprint.locate(vertices.astype(np.float64))
     in_grid = u >= 0
@@ -186,6 +188,7 @@ def _inpaint_colors(
     new, known: vertices [N,3] in the hole and in the surroundings; column: (u, v) of the new ones; above:
     (u, v, height) of the known ones.
     """
+    check_cancelled()
     u, v, height = above
     shape = footprint.hole.shape
     slot = block.slot[tuple(known.T)]
@@ -284,6 +287,7 @@ def _inpaint_table(unknown: Mask, given: Mask, table: Array, confidence: Array) 
     The first three values, the mean colors, get the texture, which fits stored rows by their `confidence`
     [U,V].
     """
+    check_cancelled()
     filled = solve_membrane(unknown, given, table)
     unfilled = unknown & ~given
     values = table[:, :3].sum(axis=1).reshape(given.shape)
@@ -303,6 +307,7 @@ def solve_membrane(hole: Mask, given: Mask, table: Array) -> Array:
 
     Neighbors that are neither given nor in the hole do not count.
     """
+    check_cancelled()
     unknown = np.flatnonzero(hole.reshape(-1) & ~given.reshape(-1))
     number = np.full(hole.size, -1, np.int64)
     number[unknown] = np.arange(len(unknown))

@@ -32,6 +32,7 @@ from cagefield.completion.surfaces.charbonnier import charbonnier_residuals, est
 from cagefield.completion.surfaces.grid_block import SOLID_OPTICAL_DEPTH
 from cagefield.completion.surfaces.surfels import Surfels, build_distance_grid
 from cagefield.completion.surfaces.visibility import CameraVisibility, SurfacePairs
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.typing import Array
 
@@ -96,6 +97,7 @@ class LightModel:
 
     def log_light(self, around: Sequence[Surfels], surfels: Surfels) -> Array:
         """Log of the brightness [N] of surfels [N] among all the surfaces around."""
+        check_cancelled()
         log = np.zeros(len(surfels.points))
         if sum(self.weights) > MIN_WEIGHT_SUM:
             log += self.log_openness(occlusion_terms(around, surfels, self.radii))
@@ -121,6 +123,7 @@ class LightModel:
 
 def occlusion_terms(around: Sequence[Surfels], surfels: Surfels, radii: Sequence[float]) -> Array:
     """Occlusion terms max(0, 1 - D(p + r n) / r) [N,R] at surfels (p, n) [N], for radii r."""
+    check_cancelled()
     return np.asarray(np.max([each.occlusion_terms(surfels, radii) for each in around], axis=0))
 
 
@@ -189,6 +192,7 @@ def _occlusion_change(
     model: LightModel, visibility: CameraVisibility, radii: Sequence[float], pairs: SurfacePairs | NormalPairs
 ) -> Array:
     """Changes of log color [N] of pairs that openness explains."""
+    check_cancelled()
     if sum(model.weights) <= MIN_WEIGHT_SUM:
         return np.zeros(len(pairs.log_change))
     around = [visibility.surface.downsample(SURFEL_CELL_SHARE * radii[0])]

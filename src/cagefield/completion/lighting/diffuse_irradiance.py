@@ -22,6 +22,7 @@ from scipy import optimize
 from cagefield.completion.surfaces.charbonnier import charbonnier_loss, charbonnier_residuals, estimate_noise
 from cagefield.completion.surfaces.surfels import Surfels, average_normals
 from cagefield.completion.surfaces.visibility import CameraVisibility
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.typing import AnyArray, Array
 
 MAX_SURFELS_PER_DISTANCE = 40_000
@@ -94,6 +95,7 @@ def sample_normal_pairs(
     visibility: CameraVisibility, distances: Sequence[float], *, seed: int = 0
 ) -> NormalPairs:
     """Pairs of visible surfels, at about each of the `distances` from each other, world units."""
+    check_cancelled()
     rng = np.random.default_rng(seed)
     surface, count = visibility.surface, len(visibility.log_brightness)
     first, second = np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -156,6 +158,7 @@ def fit_diffuse_light(first: Surfels, second: Surfels, change: Array) -> Diffuse
 
 def _fit_gradient(first: Surfels, second: Surfels, change: Array, noise: float) -> Array:
     """Gradient a [3] fitted to pairs."""
+    check_cancelled()
 
     def residuals(gradient: Array) -> Array:
         weighted = charbonnier_residuals(_residuals(gradient, first, second, change, noise))

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cagefield.completion.surfaces.surfels import DistanceFunction, Surfels
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.typing import AnyArray, Array
 
 LIGHT_TANGENT = 0.12
@@ -78,6 +79,7 @@ def light_visibility(
     distance: DistanceFunction, points: Array, normals: AnyArray, direction: Array, near: float, far: float
 ) -> Array:
     """Visibility V [N] of a light from points [N,3] with normals [N,3]; rays as in `DirectionalLight`."""
+    check_cancelled()
     start = points + near * normals
     t, visibility = np.full(len(points), near), np.ones(len(points))
     active = np.arange(len(points))

@@ -16,6 +16,7 @@ from cagefield.completion.surfaces.visibility import (
     CameraVisibility,
     count_edited_views,
 )
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.edits import EditMap
 from cagefield.edits.patch import NewLight
 from cagefield.typing import Array, Mask
@@ -47,6 +48,7 @@ class LightChange:
         spacing: distance of the surfels, world units. Vertices within MAX_LIGHT_DEPTH_VOXELS of a surface,
         mostly beneath it, show through it, as fields are foggy there.
         """
+        check_cancelled()
         changed_rows = np.flatnonzero(logs)
         mask, log = np.zeros(block.shape, bool), np.zeros(0)
         if len(changed_rows):
@@ -79,6 +81,7 @@ class LightChange:
 
     def interpolate(self, block: GridBlock, points: Array) -> Array:
         """Log ratio [N] at world points [N,3], from the vertices around that have one; 0 without any."""
+        check_cancelled()
         total = block.interpolate(self.mask.astype(np.float32), points)
         return np.asarray(block.interpolate(self.to_array(block), points) / np.maximum(total, 1e-3))
 

@@ -21,6 +21,7 @@ from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.support_plane import PLANE_DISTANCE_VOXELS, Support
 from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.completion.surfaces.visibility import CameraVisibility
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.geometry.cage import Cage
 
 PRIOR_STRENGTH_DEVIATION = 0.3
@@ -67,6 +68,7 @@ def fit_shadow_strength(
     part, others: surfels of the part, and of all else, in a block; inner: V^c; visibility: the field's
     visible surfaces.
     """
+    check_cancelled()
     if visibility is None or not len(part.points):
         return 1.0
     near_rows = np.flatnonzero(part.distance(visibility.surface.points, model.max_radius) < model.max_radius)

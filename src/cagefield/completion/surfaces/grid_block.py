@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.edits import EditMap
 from cagefield.fields.contraction import uncontract
 from cagefield.fields.sh import C0, scale_sh_colors
@@ -159,6 +160,7 @@ class GridBlock:
         `region` and the whole block without any such vertex, or outside the uniform part of an unbounded
         field.
         """
+        check_cancelled()
         vertices, field = np.argwhere(mask), self.field
         if not len(vertices):
             return region, self
@@ -209,6 +211,7 @@ class GridBlock:
 
     def changed_from(self, other: GridBlock, tolerance: float = MIN_COEFFICIENT_DIFFERENCE) -> Mask:
         """Mask [X,Y,Z] of vertices whose density or color differs from an `other` block of the same place."""
+        check_cancelled()
         changed = self.density != other.density
         both_colored = (self.slot >= 0) & (other.slot >= 0)
         difference = np.abs(self.sh[self.slot[both_colored]] - other.sh[other.slot[both_colored]]).max(
@@ -243,6 +246,7 @@ def extract_block(
     canonical points, and colors are rotated; a vertex that the edits empty has neither. With
     `preserve_opacity` density is multiplied by |det J|^(1/3), the mean stretch over directions.
     """
+    check_cancelled()
     corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
     g = field.grid_coordinates(corners)
     last = np.array(field.resolution) - 1
@@ -324,6 +328,7 @@ def sample_edited_field(
 
     Colors are rotated by the edits and then by the Jacobians `turn` [N,3,3]; density as in `extract_block`.
     """
+    check_cancelled()
     mapped = below.to_canonical(points)
     jacobian = mapped.jacobian if turn is None else mapped.jacobian @ np.linalg.inv(turn)
     raw, sh = _sample_layers((field, *below.layers), mapped.layer, mapped.points, jacobian)
@@ -346,6 +351,7 @@ def _sample_layers(
 
 def interpolate_field(field: VoxelField, points: Array) -> tuple[Float32, Float32]:
     """(density [N] before its clamp, sh [N,K,3]) of a field at canonical points [N,3]; 0 outside its grid."""
+    check_cancelled()
     n = np.array(field.resolution)
     g = field.grid_coordinates(points)
     inside = ((g >= 0) & (g <= n - 1)).all(axis=1)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from cagefield.completion.surfaces.surfels import Surfels
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.typing import Array
 
 MAX_PLANES = 4
@@ -63,6 +64,7 @@ def snap_to_planes(
     that is tilted or off its plane is snapped only if inliers of the plane surround it: a bump is snapped,
     the rounded edge of a table is not. `voxel` is in world units.
     """
+    check_cancelled()
     points, normals = surface.points.copy(), surface.normals.copy()
     unassigned = np.ones(len(points), bool)
     rng = np.random.default_rng(seed)
@@ -126,6 +128,7 @@ def _fit_plane(
     points: Array, normals: Array, voxel: float, rng: np.random.Generator
 ) -> tuple[Array, Array] | None:
     """(point [3], normal [3]) of the plane with the most inliers, or None below MIN_INLIERS."""
+    check_cancelled()
     sample = rng.choice(len(points), min(MAX_SURFELS_PER_TRIAL, len(points)), replace=False)
     hypotheses = rng.choice(len(points), min(TRIALS_PER_PLANE, len(points)), replace=False)
     distance = points[sample] @ normals[hypotheses].T - (points[hypotheses] * normals[hypotheses]).sum(axis=1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.fields.sh import C0
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.splat_mixture import SplatMixture
@@ -48,6 +49,7 @@ def voxelize_splats(splats: SplatField, box: Array, voxel: float) -> VoxelField:
 
     `voxel` is the edge of a voxel, world units; the box grows to a whole number of them.
     """
+    check_cancelled()
     count = np.maximum(np.ceil((box[1] - box[0]) / voxel).astype(np.int64), 2) + 1
     bounds = box.mean(axis=0) + 0.5 * voxel * (count - 1) * np.array([[-1.0], [1.0]])
     wide = _widen_splats(splats, bounds, voxel)

@@ -10,6 +10,7 @@ from scipy import ndimage
 
 from cagefield.completion.surfaces.plane_snapping import snap_to_planes
 from cagefield.completion.surfaces.surfels import Surfels
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.typing import Array, Mask
 
 PLANE_TRIALS = 200
@@ -59,6 +60,7 @@ def find_support(
 
     coordinates [N,3]: block coordinates of the surfels; is_near [N]: candidates; voxel: world units.
     """
+    check_cancelled()
     flat, on = snap_to_planes(surface.take(is_near), voxel)
     normals, ring = surface.normals.copy(), np.zeros(len(coordinates), bool)
     normals[is_near], ring[is_near] = flat.normals, on
@@ -73,6 +75,7 @@ def fit_support(
     coordinates, normals [N,3]: block coordinates and normals of all surfels. RANSAC weights each surfel by
     its distance from the part along the normal. All surfels on the plane become its members.
     """
+    check_cancelled()
     ring, vertices = ring.copy(), np.argwhere(part).astype(np.float64)
     for _ in range(MAX_CANDIDATE_PLANES):
         if ring.sum() < MIN_SUPPORT_SURFELS or not len(vertices):

@@ -14,6 +14,7 @@ import numpy as np
 
 from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.surfels import Surfels, extract_surfels
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.typing import Array, Float32, Mask
 
 RAY_START_VOXELS = 2.0
@@ -43,6 +44,7 @@ CROP_MARGIN_VERTICES = 12
 
 def denoise_colors(block: GridBlock, where: Mask, log: Array) -> GridBlock:
     """Block without color noise at vertices `where` [X,Y,Z], whose light gains a factor exp(log) [N]."""
+    check_cancelled()
     share = np.clip(
         (log - MIN_DENOISED_LOG_GAIN) / (FULLY_DENOISED_LOG_GAIN - MIN_DENOISED_LOG_GAIN), 0.0, 1.0
     )
@@ -77,6 +79,7 @@ def denoise_colors(block: GridBlock, where: Mask, log: Array) -> GridBlock:
 
 def colors_along_normals(block: GridBlock, surface: Surfels) -> tuple[Float32, Float32]:
     """(spherical-harmonics coefficients [N,K,3], opacity [N]) rendered along the normals of surfels [N]."""
+    check_cancelled()
     start, size = block.block_coordinates(surface.points), np.array(block.shape)
     direction = surface.normals / np.array(block.spacing)
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)

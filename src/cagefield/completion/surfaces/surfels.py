@@ -19,6 +19,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from cagefield.completion.surfaces.grid_block import GridBlock, world_positions
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.geometry import hexahedron
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Mask
@@ -89,6 +90,7 @@ class Surfels:
 
         FAR_DISTANCE and False beyond `radius`, world units.
         """
+        check_cancelled()
         distance, behind = np.full(len(points), FAR_DISTANCE), np.zeros(len(points), bool)
         if len(self.points) and len(points):
             nearest_distance, nearest = self._tree.query(points, distance_upper_bound=radius, workers=-1)
@@ -130,6 +132,7 @@ class Surfels:
 
         A neighbor beyond `radius`, world units, has distance inf and row N.
         """
+        check_cancelled()
         distances, rows = self._tree.query(
             points, k=[*range(1, count + 1)], distance_upper_bound=radius, workers=-1
         )
@@ -156,6 +159,7 @@ class Surfels:
 
         A cell has one for each dominant axis and sign of its normals.
         """
+        check_cancelled()
         if not len(self.points):
             return self
         # Surfaces often lie at whole numbers, where rounding errors would decide on their cells.
@@ -179,6 +183,7 @@ def build_distance_grid(surfaces: Sequence[Surfels], edge: float) -> DistanceFun
 
     The distance is unsigned. A look-up takes constant time, which pays off for long ray marches.
     """
+    check_cancelled()
     points = np.concatenate([each.points for each in surfaces])
     if not len(points):
         return lambda points, radius=np.inf: np.full(len(points), FAR_DISTANCE)
@@ -227,6 +232,7 @@ def prefer_visible(surface: Surfels, visible: Surfels, voxel: float) -> Surfels:
 
 def extract_surfels(block: GridBlock) -> Surfels:
     """Surfels of a block, at half transmittance along the normals of its surface vertices."""
+    check_cancelled()
     vertices = np.argwhere(block.surface)
     if not len(vertices):
         return Surfels(np.zeros((0, 3)), np.zeros((0, 3)))
@@ -274,6 +280,7 @@ def extract_cut_faces(block: GridBlock, cage: Cage) -> Surfels:
 
 def _smooth_normals(points: Array, normals: Array, radius: float) -> Array:
     """Unit normals [N,3], averaged over points [N,3] within `radius` that face similarly."""
+    check_cancelled()
     count = min(SMOOTHING_NEIGHBORS, len(points))
     distances, rows = cKDTree(points).query(
         points, k=[*range(1, count + 1)], distance_upper_bound=radius, workers=-1

@@ -11,6 +11,7 @@ from scipy import ndimage
 
 from cagefield.cameras.camera import Camera
 from cagefield.completion.surfaces.surfels import Surfels, concatenate_surfels
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.edits import EditMap
 from cagefield.images.render_result import RenderResult
 from cagefield.typing import Array, Mask
@@ -122,6 +123,7 @@ def render_visibility(
     )
     pairs, surfaces, log_brightness, hue, depths = [], [], [], [], []
     for camera in used:
+        check_cancelled()
         image = render(camera)
         surface, solid = _image_surfels(image, camera)
         colors = np.clip(image.rgb.reshape(-1, 3), 0.02, 1.0)

@@ -219,8 +219,12 @@ class PictureHeader(Message):
     height: int
     full_width: int
     full_height: int
-    final: bool
+    whole: bool
     """True for the last part of a full-resolution picture."""
+    refinement: int
+    """Refinement that it has (`render_worker.refinement`), 3 the final one."""
+    final: bool
+    """True where it is whole and nothing refines it."""
     format: Literal["jpeg", "rgb"]
     picture_bytes: int
     depth_bytes: int

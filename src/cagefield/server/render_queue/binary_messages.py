@@ -6,6 +6,7 @@ from cagefield.server.protocol import server_messages
 from cagefield.server.protocol.common import Message
 from cagefield.server.render_queue.dispatcher import Stamp
 from cagefield.server.render_queue.requests import EditsRequest, Request
+from cagefield.server.render_worker.refinement import FINAL
 from cagefield.server.render_worker.tasks import EditsDone, Failed, PictureDone
 
 
@@ -27,7 +28,9 @@ def picture_message(request: Request, stamp: Stamp, done: PictureDone) -> bytes:
         height=region.height,
         full_width=region.full_width,
         full_height=region.full_height,
-        final=request.final,
+        whole=request.last,
+        refinement=done.refinement,
+        final=request.last and done.refinement == FINAL,
         format=done.format,
         picture_bytes=len(done.picture),
         depth_bytes=len(done.depth),
@@ -47,7 +50,7 @@ def edits_message(request: EditsRequest, stamp: Stamp, done: EditsDone | Failed)
         drag=stamp.drag,
         seq=stamp.seq,
         revision=stamp.revision,
-        final=request.exact,
+        final=not isinstance(done, EditsDone) or done.refinement == FINAL,
         why=None if isinstance(done, EditsDone) else done.text,
         map_ms=1e3 * done.map_seconds if isinstance(done, EditsDone) else 0.0,
         encode_ms=1e3 * done.encode_seconds if isinstance(done, EditsDone) else 0.0,

@@ -261,7 +261,7 @@ class Coordinator:
             region,
             request.display,
             request.moving,
-            request.exact,
+            request.refinement,
             generation,
         )
         return task, Stamp(self._shown_revision, *page.stamp)
@@ -269,7 +269,7 @@ class Coordinator:
     def edits_task(self, request: EditsRequest, generation: int) -> tuple[PageEditsTask, Stamp]:
         """The task of edits that a page draws itself."""
         page = self.pages[request.page]
-        task = PageEditsTask(request.number, self._shown, request.exact, page.has, generation)
+        task = PageEditsTask(request.number, self._shown, request.refinement, page.has, generation)
         return task, Stamp(self._shown_revision, *page.stamp)
 
     def differing(self, page: int, one: int, another: int) -> Rect | None:

@@ -20,6 +20,7 @@ from cagefield.server.render_queue.damage import Rect
 from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_queue.scheduler import Scheduler
 from cagefield.server.render_worker.process import Worker
+from cagefield.server.render_worker.refinement import FINAL
 from cagefield.server.render_worker.tasks import (
     Answered,
     EditsDone,
@@ -275,7 +276,7 @@ class Dispatcher:
             return
         if isinstance(request, EditsRequest):
             if isinstance(result, (EditsDone, Failed)):
-                self.scheduler.sent(request)
+                self.scheduler.sent(request, result.refinement if isinstance(result, EditsDone) else FINAL)
                 self._source.deliver_edits(request, running.stamp, result)
             else:
                 self.scheduler.abandoned(request, again=True)
@@ -287,6 +288,7 @@ class Dispatcher:
                 region.width * region.height,
                 result.render_seconds + result.encode_seconds,
                 result.map_seconds,
+                result.refinement,
             )
             self._source.deliver(request, running.stamp, result)
             return

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from cagefield.server.render_worker.refinement import Refinement
 from cagefield.server.render_worker.view import Display, Region
 
 
 @dataclass(frozen=True)
 class Request:
-    """A picture to be rendered: `exact` with the edits' own lattices, `final` the last tile of a view.
+    """A picture to be rendered with a refinement; `last` is the last tile of a view in full resolution.
 
     `complete` says that with it everything is drawn that was not as it should be.
     """
@@ -21,21 +22,18 @@ class Request:
     display: Display
     region: Region
     moving: bool
-    exact: bool
-    final: bool
+    refinement: Refinement
+    last: bool
     complete: bool = True
 
 
 @dataclass(frozen=True)
 class EditsRequest:
-    """Edits for a page that draws them itself: `exact` with their own lattices."""
+    """Edits with a refinement for a page that draws them itself."""
 
     number: int
     page: int
     revision: int
-    exact: bool
-
-    @property
-    def moving(self) -> bool:
-        """Whether they are those of a drag."""
-        return not self.exact
+    refinement: Refinement
+    moving: bool
+    """Whether they are those of a drag."""

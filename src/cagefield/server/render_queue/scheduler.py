@@ -3,8 +3,8 @@ its inputs are events with their times, its output the next image.
 
 - While anything moves (a camera, a drag) pictures of the whole view come at the resolution that the measured
   speed allows; each shows the newest input, older input that no picture showed is passed over.
-- At rest the view is rendered at full resolution in tiles, the middle first; they are abandoned the moment
-  anything changes.
+- At rest the view is rendered at full resolution in tiles, the middle first, and again for each refinement
+  that changes it; they are abandoned the moment anything changes.
 - Where the camera is the one of the last whole picture, only the part that the edits change is rendered.
 - A page is owed a picture only while none of its pictures is on its way; at rest, fewer than two.
 - A page that draws itself is owed the edits instead, the newest of a drag, and no images during motion.
@@ -27,6 +27,7 @@ from cagefield.server.render_queue.damage import (
     union,
 )
 from cagefield.server.render_queue.requests import EditsRequest, Request
+from cagefield.server.render_worker.refinement import FINAL, Refinement
 from cagefield.server.render_worker.view import Display, Region
 
 MOST_UNSHOWN, MOST_MOVING = 2, 1
@@ -76,12 +77,15 @@ class _Page:
     whole: bool = False
     """Whether those tiles are of the whole view."""
     showing: Showing = field(default_factory=Showing)
-    tiles_exact: bool = False
+    refinement: Refinement = Refinement.DRAFT
+    """Refinement of those tiles."""
+    attained: Refinement = FINAL
+    """Refinement that all of those tiles have that were rendered."""
     served: float = -math.inf
     draws: DrawnHere = "nothing"
     """Which pictures the page draws itself."""
-    edits: tuple[int, bool] | None = None
-    """The revision, and whether exact, of the edits that the page was sent last."""
+    edits: tuple[int, Refinement] | None = None
+    """The revision and the refinement of the edits that the page was sent last."""
 
 
 class Scheduler:
@@ -100,6 +104,8 @@ class Scheduler:
         self._overhead = 0.0
         self._dragging = False
         self._revision = 0
+        self._known = Refinement.DRAFT
+        """Last refinement of the revision that was rendered: it costs nothing to have it again."""
         self._running: tuple[Request | EditsRequest, int] | None = None
         self.generation = 0
         """Grows when a tile that is being rendered is no longer wanted."""
@@ -143,6 +149,8 @@ class Scheduler:
         if revision == self._revision and dragging == self._dragging:
             return
         let_go, same = self._dragging and not dragging, revision == self._revision
+        if not same:
+            self._known = Refinement.DRAFT
         self._revision, self._dragging = revision, dragging
         for page, p in self._pages.items():
             was_shown = same and p.shown_version == p.version
@@ -168,9 +176,16 @@ class Scheduler:
         if p is not None:
             p.unshown = [number for number in p.unshown if number > picture]
 
-    def finished(self, request: Request, rays: int, seconds: float, overhead: float) -> None:
-        """The picture was rendered and sent; `overhead` of the seconds went into the edits' map."""
-        self._running = None
+    def finished(
+        self, request: Request, rays: int, seconds: float, overhead: float, attained: Refinement
+    ) -> None:
+        """The picture was rendered and sent; `overhead` of the seconds went into the edits' map.
+
+        `attained` is the last refinement that it has.
+        """
+        running, self._running = self._running, None
+        if request.revision == self._revision:
+            self._known = max(self._known, attained)
         region = request.region
         whole = (region.width, region.height) == (region.full_width, region.full_height)
         if whole or request.moving:
@@ -181,6 +196,8 @@ class Scheduler:
         page = self._pages.get(request.page)
         if page is not None:
             page.unshown.append(request.number)
+            if running is not None and page.version == running[1] and not request.moving:
+                page.attained = min(page.attained, attained)
             page.showing.drawn(
                 (request.camera, request.display),
                 request.revision,
@@ -192,15 +209,17 @@ class Scheduler:
                 ),
                 whole=whole or (request.complete and page.whole and not request.moving),
                 all_wanting=request.complete,
-                exact=request.exact,
+                exact=attained == FINAL and not request.moving,
             )
 
-    def sent(self, request: EditsRequest) -> None:
-        """The edits were made and sent."""
+    def sent(self, request: EditsRequest, attained: Refinement) -> None:
+        """The edits were made and sent, with a refinement that they have at least."""
         self._running = None
         page = self._pages.get(request.page)
         if page is not None:
             page.unshown.append(request.number)
+            if page.edits == (request.revision, request.refinement):
+                page.edits = request.revision, attained
 
     def abandoned(self, request: Request | EditsRequest, again: bool) -> None:
         """The picture was not rendered: stopped or lost, and is wanted `again`, or not possible at all."""
@@ -243,7 +262,7 @@ class Scheduler:
         waits = [
             p.changed + SETTLE_SECONDS - now
             for p in self._pages.values()
-            if p.camera >= 0 and p.tiles != [] and not p.moving and self._has_room(p)
+            if p.camera >= 0 and self._owes_tiles(p) and not p.moving and self._has_room(p)
         ]
         return max(0.0, min(waits)) if waits else None
 
@@ -267,7 +286,7 @@ class Scheduler:
         """
         return (self._running is None and not self._dragging) and all(
             p.camera < 0
-            or (not p.moving and ((p.tiles == [] and not self._owes_edits(p)) or not self._has_room(p)))
+            or (not p.moving and (not (self._owes_tiles(p) or self._owes_edits(p)) or not self._has_room(p)))
             for p in self._pages.values()
         )
 
@@ -290,15 +309,29 @@ class Scheduler:
     def _owes_edits(self, p: _Page) -> bool:
         if p.draws == "nothing":
             return False
-        return p.edits not in ((self._revision, True), (self._revision, not self._dragging))
+        if p.edits is None or p.edits[0] != self._revision:
+            return True
+        if self._dragging or p.edits[1] == FINAL:
+            return False
+        return p.draws == "all" or not self._owes_tiles(p)
+
+    def _owes_tiles(self, p: _Page) -> bool:
+        """Whether tiles are still to come, or to be cut: of this refinement or the next."""
+        if p.draws == "all":
+            return p.tiles is None
+        return p.tiles != [] or (p.attained < FINAL and not self._dragging)
 
     def _edits(self, page: int) -> EditsRequest:
         p = self._pages[page]
-        p.edits = self._revision, not self._dragging
+        before = p.edits
+        refinement = Refinement.DRAFT
+        if before is not None and before[0] == self._revision:
+            refinement = Refinement(before[1] + 1)
+        p.edits = self._revision, refinement
         # The page draws them over what it shows.
         p.showing.lost()
         self._numbers += 1
-        return EditsRequest(self._numbers, page, self._revision, not self._dragging)
+        return EditsRequest(self._numbers, page, self._revision, refinement, self._dragging)
 
     def _request(self, page: int, now: float) -> Request | None:
         p = self._pages[page]
@@ -314,30 +347,41 @@ class Scheduler:
             p.shown_version = p.version
             if scale < 1.0 or p.moving or self._dragging:
                 return self._picture(page, scale, rect)
-            self._cut(page, exact=True)
+            self._cut(page, self._known)
         if p.tiles is None:
             if p.moving or now - p.changed < SETTLE_SECONDS:
                 return None
-            self._cut(page, exact=not self._dragging)
+            self._cut(page, self._known)
+        elif not p.tiles and p.attained < FINAL and not self._dragging:
+            self._cut(page, Refinement(p.attained + 1))
         if not p.tiles:
             return None
         region = p.tiles.pop(0)
         last = not p.tiles
-        return self._ask(page, region, moving=False, exact=p.tiles_exact, final=last, complete=last)
+        return self._ask(page, region, p.refinement, moving=False, last=last, complete=last)
 
     def _picture(self, page: int, scale: float, rect: Rect | None) -> Request:
         p = self._pages[page]
         width, height = (max(16, 2 * round(n * scale / 2)) for n in (p.width, p.height))
         region = Region(*pixels(rect, width, height), width, height)
-        return self._ask(page, region, moving=True, exact=False, final=False, complete=True)
+        return self._ask(page, region, Refinement.DRAFT, moving=True, last=False, complete=True)
 
     def _ask(
-        self, page: int, region: Region, *, moving: bool, exact: bool, final: bool, complete: bool
+        self, page: int, region: Region, refinement: Refinement, *, moving: bool, last: bool, complete: bool
     ) -> Request:
         p = self._pages[page]
         self._numbers += 1
         return Request(
-            self._numbers, page, p.camera, self._revision, p.display, region, moving, exact, final, complete
+            self._numbers,
+            page,
+            p.camera,
+            self._revision,
+            p.display,
+            region,
+            moving,
+            refinement,
+            last,
+            complete,
         )
 
     def _scale(self, p: _Page, rect: Rect | None) -> float:
@@ -347,9 +391,10 @@ class Scheduler:
         least = min(1.0, MIN_SIDE_PX / min(p.width, p.height))
         return max(next((s for s in RESOLUTION_SCALES if s <= wanted), RESOLUTION_SCALES[-1]), least)
 
-    def _cut(self, page: int, exact: bool) -> None:
+    def _cut(self, page: int, refinement: Refinement) -> None:
         """Divide the damaged part of the view into tiles of about TILE_SECONDS."""
         p = self._pages[page]
+        exact = not self._dragging
         view = p.camera, p.display
         rect = p.showing.wanting(page, view, self._revision, self._differing, exact=exact)
         if exact and self.whole_at_rest and rect is not None:
@@ -361,4 +406,4 @@ class Scheduler:
         p.whole = part == (0, 0, p.width, p.height)
         count = min(max(1.0, part[2] * part[3] / (self._rate * TILE_SECONDS)), MAX_TILES)
         p.tiles = [Region(*tile, p.width, p.height) for tile in tiles(part, count)]
-        p.tiles_exact = exact
+        p.refinement, p.attained = refinement, FINAL

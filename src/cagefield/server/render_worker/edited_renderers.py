@@ -1,4 +1,4 @@
-"""Renderers of one field under the edits shown last: exact ones, and coarse ones for motion."""
+"""Renderers of one field under the edits shown last, by the refinement of their picture."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from cagefield.completion.patcher import PatchStage
 from cagefield.edits import Continuous, Edit
 from cagefield.server.editor.identity_cache import IdentityCache
+from cagefield.server.render_worker.refinement import FINAL, Refinement
 
 if TYPE_CHECKING:
     from cagefield.completion.patcher import Patcher
@@ -17,15 +19,25 @@ QUICK_LATTICE = 32
 """Most lattice nodes along an axis while a cage is dragged."""
 
 
+KEPT_FINAL = 2
+"""Final renderers that are kept: of the pages' pictures, and of a job's."""
+
+
 @dataclass(frozen=True)
-class _Kept:
-    """A renderer that is ready, and its edits."""
+class RefinedRenderer:
+    """A renderer of edits.
+
+    `refinement` is the last one that it has: at least the one asked for, later ones where they are known or
+    change nothing.
+    """
 
     edits: tuple[Edit, ...]
     preserve_opacity: bool
+    refinement: Refinement
     renderer: InteractiveRenderer
 
     def shows(self, edits: tuple[Edit, ...], preserve_opacity: bool) -> bool:
+        """Whether it shows these edits."""
         return self.edits == edits and self.preserve_opacity == preserve_opacity
 
 
@@ -36,13 +48,13 @@ class EditedRenderers:
         """`is_sampled`: rays are sampled, and samples mapped; lattices are for those alone."""
         self._plain, self._is_sampled, self._patcher = plain, is_sampled, patcher
         self._coarse: IdentityCache[Edit, Edit] = IdentityCache(32)
-        self._exact: list[_Kept] = []
-        self._quick: list[_Kept] = []
+        self._kept: list[RefinedRenderer] = []
+        """The newest last: one that is not final, at most KEPT_FINAL that are."""
 
     @property
-    def exact(self) -> list[InteractiveRenderer]:
-        """The exact renderers that are ready, the newest last."""
-        return [kept.renderer for kept in self._exact]
+    def final(self) -> list[InteractiveRenderer]:
+        """The final renderers that are ready, the newest last."""
+        return [kept.renderer for kept in self._kept if kept.refinement == FINAL]
 
     def keep_only(self, edits: Sequence[Edit]) -> None:
         """Release results of other edits, except renderers."""
@@ -52,36 +64,39 @@ class EditedRenderers:
         self,
         edits: Sequence[Edit],
         preserve_opacity: bool,
-        exact: bool,
+        refinement: Refinement,
         proceed: Callable[[], None] | None = None,
-    ) -> InteractiveRenderer:
-        """The renderer of the edits: one that is ready, else an exact or a quick one made now.
+    ) -> RefinedRenderer:
+        """The renderer of the edits with a refinement, or a later one: one that is kept, else made now.
 
-        `proceed` is called while it is made, and gives it up by raising.
+        `proceed` is called while it is made, and cancels by raising.
         """
         wanted = tuple(edits)
-        for kept in self._exact if exact else (*self._exact, *self._quick):
-            if kept.shows(wanted, preserve_opacity):
-                return kept.renderer
+        for kept in sorted(self._kept, key=lambda kept: -kept.refinement):
+            if kept.refinement >= refinement and kept.shows(wanted, preserve_opacity):
+                return kept
         shown = list(wanted)
-        if not exact and self._is_sampled:
-            ready = {id(edit) for kept in self._exact for edit in kept.edits}
+        if refinement.is_coarse and self._is_sampled:
+            exact = (kept.edits for kept in self._kept if not kept.refinement.is_coarse)
+            ready = {id(edit) for each in exact for edit in each}
             shown = [edit if id(edit) in ready else self._quickly(edit) for edit in shown]
-        # Occupancy under edits that both share is kept.
-        last = self._exact[-1:] if exact else (self._quick or self._exact[-1:])
         stack = self._patcher.prepare(
-            shown, moving=not exact, preserve_opacity=preserve_opacity, proceed=proceed
+            shown, stage=STAGES[refinement], preserve_opacity=preserve_opacity, proceed=proceed
         )
-        renderer = (last[0].renderer if last else self._plain).with_edits(
-            stack, preserve_opacity=preserve_opacity, coarse=not exact, proceed=proceed
+        # Occupancy under edits that both share is kept.
+        alike = [kept for kept in self._kept if kept.refinement.is_coarse == refinement.is_coarse]
+        base = (alike or self._kept)[-1].renderer if alike or self._kept else self._plain
+        renderer = base.with_edits(
+            stack, preserve_opacity=preserve_opacity, coarse=refinement.is_coarse, proceed=proceed
         )
-        kept = _Kept(wanted, preserve_opacity, renderer)
-        if exact:
-            # Two: what pages show, and what a job renders.
-            self._exact = [*self._exact[-1:], kept]
+        attained = attained_refinement(refinement, wanted, self._patcher)
+        made = RefinedRenderer(wanted, preserve_opacity, attained, renderer)
+        final = [kept for kept in self._kept if kept.refinement == FINAL]
+        if attained == FINAL:
+            self._kept = [*final[1 - KEPT_FINAL :], made]
         else:
-            self._quick = [kept]
-        return renderer
+            self._kept = [*final, made]
+        return made
 
     def _quickly(self, edit: Edit) -> Edit:
         """The edit with a coarser lattice, kept as long as the edit is."""
@@ -90,3 +105,25 @@ class EditedRenderers:
         if edit in self._coarse:
             return self._coarse[edit]
         return self._coarse.put(edit, edit.replace(lattice=QUICK_LATTICE))
+
+
+STAGES = {
+    Refinement.DRAFT: PatchStage.CACHED,
+    Refinement.INPAINTED: PatchStage.INPAINTED,
+    Refinement.EXACT: PatchStage.INPAINTED,
+    Refinement.LIT: PatchStage.LIT,
+}
+"""Patches of each refinement."""
+
+
+def attained_refinement(made: Refinement, edits: Sequence[Edit], patcher: Patcher) -> Refinement:
+    """The last refinement that a picture of edits `made` with one has: those after it change nothing."""
+    patches = patcher.attained_stage(edits)
+    is_coarse = made.is_coarse and any(
+        isinstance(edit, Continuous) and edit.enabled and edit.changes_anything for edit in edits
+    )
+    if made < Refinement.INPAINTED and patches < PatchStage.INPAINTED:
+        return made
+    if is_coarse:
+        return max(made, Refinement.INPAINTED)
+    return max(made, Refinement.EXACT) if patches < PatchStage.LIT else FINAL

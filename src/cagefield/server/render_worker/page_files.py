@@ -20,7 +20,7 @@ from cagefield.rendering.voxels.occupancy import Occupancy
 from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.render_worker.cancellation import GivenUpError, Stop, cancellation_check
-from cagefield.server.render_worker.edited_renderers import EditedRenderers
+from cagefield.server.render_worker.edited_renderers import STAGES, EditedRenderers, attained_refinement
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.tasks import EditsDone, PageEditsTask, Stopped
 
@@ -63,18 +63,24 @@ class PageFiles:
         same = all(one is other for one, other in zip(edits, drawn, strict=True))
         renderers = self._renderers.edited if same else self._own
         try:
-            renderer = self._renderer(renderers, drawn, task, stop)
+            refined = renderers.renderer(
+                drawn, task.shown.preserve_opacity, task.refinement, cancellation_check(stop)
+            )
         except GivenUpError:
             return Stopped(task.number)
+        renderer = refined.renderer
+        if not isinstance(renderer, VoxelRenderer):
+            raise CagefieldError(NOT_DRAWN)
         mapped = time.perf_counter()
-        level = LEVEL if task.exact and not task.has else QUICK_LEVEL
+        level = QUICK_LEVEL if task.refinement.is_coarse or task.has else LEVEL
         found = encode_changed_edits(renderer, task.has, self._occupancies, level)
         assert found.occupancy is not None  # `encode_changed_edits` says which
         self._occupancies.pop(found.keys[-1], None)
         self._occupancies[found.keys[-1]] = found.occupancy
         while len(self._occupancies) > KEPT_OCCUPANCIES:
             del self._occupancies[next(iter(self._occupancies))]
-        return EditsDone(task.number, found.data, found.keys, mapped - began, time.perf_counter() - mapped)
+        spent = mapped - began, time.perf_counter() - mapped
+        return EditsDone(task.number, found.data, found.keys, refined.refinement, *spent)
 
     def _splat_edits(
         self, field: SplatField, shown: Sequence[Edit], task: PageEditsTask, stop: Stop
@@ -88,29 +94,22 @@ class PageFiles:
         began, proceed = time.perf_counter(), cancellation_check(stop)
         try:
             patcher = self._renderers.scene.patcher
-            edits = patcher.prepare(shown, moving=not task.exact, proceed=proceed)
+            edits = patcher.prepare(shown, stage=STAGES[task.refinement], proceed=proceed)
+            is_coarse = task.refinement.is_coarse
             changed = changed_splats(
                 field,
                 edits,
                 preserve_opacity=task.shown.preserve_opacity,
-                coarse=not task.exact,
-                split=split_of(field, edits, proceed=proceed) if task.exact else None,
+                coarse=is_coarse,
+                split=None if is_coarse else split_of(field, edits, proceed=proceed),
                 proceed=proceed,
             )
         except GivenUpError:
             return Stopped(task.number)
         mapped = time.perf_counter()
         content = encode_page_splat_edits(field, changed)
-        return EditsDone(task.number, content, (), mapped - began, time.perf_counter() - mapped)
-
-    def _renderer(
-        self, renderers: EditedRenderers, edits: Sequence[Edit], task: PageEditsTask, stop: Stop
-    ) -> VoxelRenderer:
-        check = cancellation_check(stop)
-        renderer = renderers.renderer(edits, task.shown.preserve_opacity, task.exact, check)
-        if not isinstance(renderer, VoxelRenderer):
-            raise CagefieldError(NOT_DRAWN)
-        return renderer
+        attained = attained_refinement(task.refinement, shown, patcher)
+        return EditsDone(task.number, content, (), attained, mapped - began, time.perf_counter() - mapped)
 
     def _prepared(self, edit: Edit) -> Edit:
         """The edit as a page draws it, the same object each time."""

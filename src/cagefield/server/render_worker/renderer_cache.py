@@ -20,7 +20,8 @@ from cagefield.rendering.renderers import renderer_of
 from cagefield.scene.scene import Scene
 from cagefield.server.render_worker import encoding
 from cagefield.server.render_worker.cancellation import GivenUpError, Stop, cancellation_check
-from cagefield.server.render_worker.edited_renderers import EditedRenderers
+from cagefield.server.render_worker.edited_renderers import EditedRenderers, RefinedRenderer
+from cagefield.server.render_worker.refinement import FINAL, Refinement
 from cagefield.server.render_worker.tasks import (
     EditValues,
     PictureDone,
@@ -69,11 +70,10 @@ class RendererCache:
         """The part of a picture that a task asks for, encoded."""
         began = time.perf_counter()
         try:
-            renderer = (
-                self.plain
-                if task.display.before
-                else self.renderer(task.shown, task.exact, cancellation_check(stop))
-            )
+            attained, renderer = FINAL, self.plain
+            if not task.display.before:
+                refined = self.renderer(task.shown, task.refinement, cancellation_check(stop))
+                attained, renderer = refined.refinement, refined.renderer
             mapped = time.perf_counter()
             frame = self._frame(task, renderer, stop)
         except GivenUpError:
@@ -91,6 +91,7 @@ class RendererCache:
             picture,
             form,
             depth.tobytes(),
+            attained,
             (depth.shape[1], depth.shape[0]),
             scale,
             mapped - began,
@@ -101,9 +102,11 @@ class RendererCache:
     def still(self, shown: Shown, camera: Camera, display: Display, stop: Stop | None = None) -> RenderResult:
         """A whole image, its edits exact. Raises GivenUpError once `stop` returns True."""
         region = Region(0, 0, camera.width, camera.height, camera.width, camera.height)
-        task = PictureTask(0, shown, camera, region, display, stop is None, True, 0)
+        task = PictureTask(0, shown, camera, region, display, stop is None, FINAL, 0)
         stopping = stop or (lambda: False)
-        renderer = self.plain if display.before else self.renderer(shown, True, cancellation_check(stopping))
+        renderer = self.plain
+        if not display.before:
+            renderer = self.renderer(shown, FINAL, cancellation_check(stopping)).renderer
         return self._frame(task, renderer, stopping)
 
     def warm(self, stage: WarmStage) -> None:
@@ -127,13 +130,10 @@ class RendererCache:
             renderer.render(camera)
 
     def renderer(
-        self, shown: Shown, exact: bool, proceed: Callable[[], None] | None = None
-    ) -> InteractiveRenderer:
-        """The renderer of the edits: one that is ready, else an exact or a quick one made now.
-
-        `proceed` is called while it is made, and gives it up by raising.
-        """
-        return self.edited.renderer(self.edits(shown.edits), shown.preserve_opacity, exact, proceed)
+        self, shown: Shown, refinement: Refinement, proceed: Callable[[], None] | None = None
+    ) -> RefinedRenderer:
+        """The renderer of the edits with a refinement (`EditedRenderers.renderer`)."""
+        return self.edited.renderer(self.edits(shown.edits), shown.preserve_opacity, refinement, proceed)
 
     def edits(self, values: tuple[EditValues, ...]) -> list[Edit]:
         """Edits with these field values; unchanged ones are the same objects as before.

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from cagefield.completion.patcher import PatchStage
 from cagefield.edits import Continuous, EditMap
 from cagefield.fields.splat_field import SplatField
 from cagefield.rendering.splats.raster_splats import deformed_splats
@@ -16,6 +17,7 @@ from cagefield.server.render_worker.encoding import picture_of, png
 from cagefield.server.render_worker.grid_lines import grid_lines
 from cagefield.server.render_worker.job_files import JobFiles
 from cagefield.server.render_worker.page_files import PageFiles
+from cagefield.server.render_worker.refinement import Refinement
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.splat_density import dense_cells
 from cagefield.server.render_worker.tasks import (
@@ -130,7 +132,7 @@ class TaskHandlers:
         camera = task.camera
         x = min(int(task.x * camera.width), camera.width - 1)
         y = min(int(task.y * camera.height), camera.height - 1)
-        renderer = self._renderers.renderer(task.shown, False)
+        renderer = self._renderers.renderer(task.shown, Refinement.DRAFT).renderer
         frame = renderer.render(camera, normals=True, region=(x, y, 1, 1))
         if frame.normals is None or frame.opacity[0, 0] < 0.5:
             return None
@@ -147,7 +149,9 @@ class TaskHandlers:
             field, edits = content.field, content.edits
         else:
             below = self._renderers.edits(task.shown.edits)
-            edits = self._renderers.scene.patcher.prepare(below, moving=True, preserve_opacity=False)
+            edits = self._renderers.scene.patcher.prepare(
+                below, stage=PatchStage.CACHED, preserve_opacity=False
+            )
         if isinstance(field, SplatField):
             return dense_cells(task.cage, deformed_splats(field, edits)).tolist()
         from cagefield.edits.kernel_map import KernelMap

@@ -11,6 +11,7 @@ from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Still
 from cagefield.edits import Edit
 from cagefield.geometry.cage import Cage
+from cagefield.server.render_worker.refinement import Refinement
 from cagefield.server.render_worker.view import Display, Region
 
 
@@ -64,7 +65,7 @@ class PictureTask:
     region: Region
     display: Display
     moving: bool
-    exact: bool
+    refinement: Refinement
     generation: int
 
 
@@ -178,8 +179,7 @@ class PageEditsTask:
 
     number: int
     shown: Shown
-    exact: bool
-    """Whether with the edits' own lattices; else with those of a drag."""
+    refinement: Refinement
     has: tuple[str, ...]
     generation: int
 
@@ -222,6 +222,8 @@ class PictureDone:
     picture: bytes
     format: Literal["jpeg", "rgb"]
     depth: bytes
+    refinement: Refinement
+    """The last one that the picture has: at least the one asked for."""
     depth_size: tuple[int, int]
     depth_scale: float
     map_seconds: float
@@ -237,6 +239,8 @@ class EditsDone:
     number: int
     content: bytes
     keys: tuple[str, ...]
+    refinement: Refinement
+    """The last one that they have."""
     map_seconds: float
     encode_seconds: float
 
