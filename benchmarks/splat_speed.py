@@ -141,8 +141,9 @@ def landscape_table(count: int) -> Table:
 
 def edits_table(count: int) -> Table:
     """How long `count` splats take through a turn, a move and a discrete move, nothing known of them."""
-    from cagefield.rendering.splats import splat_motion, splitting
     from cagefield.rendering.splats.raster_splats import deformed_splats
+    from cagefield.rendering.splats.splat_motion import moved_splats
+    from cagefield.rendering.splats.splat_provenance import SplatSet
 
     a, b, c = (
         Cage.box(middle, half)
@@ -159,14 +160,13 @@ def edits_table(count: int) -> Table:
     SplatRenderer(field).render(camera_of(field, 64, 64))
 
     def fresh(split: bool) -> int:
-        splat_motion.known_stacks.clear()
-        splitting.known_splits.clear()
-        return len(deformed_splats(field, edits, split=split_of(field, edits) if split else None))
+        splats = SplatSet.from_field(field)
+        return len(deformed_splats(splats, edits, split=split_of(splats, edits) if split else None))
 
     rows = []
     for name, split in (("no", False), ("yes", True)):
         milliseconds = least(lambda split=split: fresh(split))
-        moved = len(splat_motion.moved_splats(field, edits).source)
+        moved = len(moved_splats(field, edits).source)
         rows.append((name, str(count), str(moved), str(fresh(split)), number(milliseconds, 0)))
     notes = (
         "Three edits, one after the other: a turn and stretch, a move, both continuous; a discrete move.",

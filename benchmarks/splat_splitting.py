@@ -124,7 +124,7 @@ def main(
     rows = []
     for name, (field, edit) in CASES.items():
         rest, edits = EditStack(), EditStack([edit])
-        parts = split_for_edits(field, edits)
+        parts = split_for_edits(field, edits).field
         truths = [volume_picture(field, each, CAMERA) for each in (None, edit)]
         pictures = [shown(splats, stack) for stack in (rest, edits) for splats in (field, parts)]
         figures = [psnr(picture, truths[n // 2]) for n, picture in enumerate(pictures)]

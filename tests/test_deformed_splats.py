@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cagefield.cameras.camera import Camera
-from cagefield.edits import Edit, EditStack, Flow, Trilinear
+from cagefield.completion.splat_patch import build_splat_patch
+from cagefield.edits import Edit, EditStack, Flow, PreparedEdit, PreparedStack, Trilinear
 from cagefield.errors import EditError
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import Cage, rotation_matrix
@@ -21,6 +22,7 @@ from cagefield.rendering.splats.kernels.deformation import polar_rotation
 from cagefield.rendering.splats.raster_splats import DeformedSplats, deformed_splats, rotation_matrices
 from cagefield.rendering.splats.reference_raster_splats import deformed_splats_reference
 from cagefield.rendering.splats.splat_motion import moved_splats
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.warps import forward
 from splat_scenes import random_splats
@@ -376,7 +378,7 @@ def test_a_longer_stack_begins_where_the_shorter_one_ended(monkeypatch):
     calls = []
     original = module.to_deformed
     monkeypatch.setattr(module, "to_deformed", lambda *a, **k: (calls.append(1), original(*a, **k))[1])
-    field = random_splats(200)
+    field = SplatSet.from_field(random_splats(200))
     edits = EDITS["turn, copy, scale"]
     whole = deformed_splats(field, EditStack(edits))
     assert len(calls) == 3
@@ -392,14 +394,15 @@ def test_a_longer_stack_begins_where_the_shorter_one_ended(monkeypatch):
     np.testing.assert_allclose(quick.means, exact.means, atol=2e-3)
     for n in range(20):
         deformed_splats(field, EditStack([edits[0].translate((1e-3 * n, 0, 0))]))
-    assert len(module.known_stacks[field]) <= module.KEPT_STACKS
+    assert len(module._known_stacks(field)) <= module.KEPT_STACKS
 
 
 def test_what_is_kept_of_a_field_ends_with_it():
-    field = random_splats(20)
-    deformed_splats(field, EditStack(EDITS["rotate"]))
-    gone = weakref.ref(field)
-    del field
+    splats = SplatSet.from_field(random_splats(20))
+    patch = build_splat_patch(splats, EditStack(), Edit.delete(INNER), None)
+    deformed_splats(splats, PreparedStack([PreparedEdit(Edit.delete(INNER), patch)]))
+    gone = weakref.ref(splats.field)
+    del splats, patch
     gc.collect()
     assert gone() is None
 

@@ -87,7 +87,7 @@ def test_splats_less_what_goes_and_what_comes_are_the_edited_ones(
     edits = EditStack([twisted, copied.translate((0.6, 0.0, 0.3)), Edit.delete(Cage.box((-0.8,) * 3, 0.3))])
     split = split_of(field, edits)
     assert split is not None
-    np.testing.assert_array_equal(split.children.sh, field.sh[split.sources])
+    np.testing.assert_array_equal(split.children.field.sh, field.sh[split.sources])
     wanted = deformed_splats(field, edits, preserve_opacity=preserve_opacity, split=split)
     changed = changed_splats(field, edits, preserve_opacity=preserve_opacity, split=split)
     found = decode_page_splat_edits(encode_page_splat_edits(field, changed, packed=packed))

@@ -25,7 +25,7 @@ from cagefield.pages.scene_page import ScenePage
 from cagefield.rendering.splats.bake_splats import baked_splats
 from cagefield.rendering.splats.raster_splats import changed_splats, deformed_splats
 from cagefield.rendering.splats.reference_raster_splats import deformed_splats_reference
-from cagefield.rendering.splats.splat_provenance import with_pasted
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.scene.scene import Scene
 from splat_rooms import LIGHT, cage, room
@@ -92,10 +92,12 @@ def test_what_is_made_is_the_oracles(folder: Path) -> None:
     again = pasted().translate((0.0, -2.5, 0.0))
     scene = with_heap(folder, before, pasted(), after, again)
     edits = scene.prepared_edits
-    field = with_pasted(scene.field, edits)  # type: ignore[arg-type]
-    assert field is with_pasted(scene.field, edits) is with_pasted(field, edits)  # type: ignore[arg-type]
+    splats = scene.rendered_field
+    assert isinstance(splats, SplatSet)
+    joined = splats.with_pastes(edits)
+    assert joined is splats.with_pastes(edits) is joined.with_pastes(edits) is not splats
     for preserve in (True, False):
-        found = deformed_splats(field, edits, preserve_opacity=preserve)
+        found = deformed_splats(splats, edits, preserve_opacity=preserve)
         wanted = deformed_splats_reference(scene.field, edits, preserve_opacity=preserve)  # type: ignore[arg-type]
         assert len(found) == len(wanted) > 650
         one, other = (np.lexsort(s.means.T.round(4)) for s in (found, wanted))
@@ -123,12 +125,14 @@ def test_a_page_has_what_is_pasted(folder: Path) -> None:
     held = decode_page_splats(page.files["field"]).field
     edits = decode_page_splat_edits(page.files["edits"])
     assert len(held) == 660 and held.sh_degree == 2
-    field = with_pasted(scene.field, scene.prepared_edits)  # type: ignore[arg-type]
-    order = page_order(field)
+    splats = scene.rendered_field
+    assert isinstance(splats, SplatSet)
+    splats = splats.with_pastes(scene.prepared_edits)
+    field, order = splats.field, page_order(splats.field)
     ours = order >= 600
     assert (held.opacities[ours] == 0.0).all() and (held.opacities[~ours] > 0.5).all()
     assert edits.hidden[ours].all() and not edits.hidden[~ours].any()
-    changed = changed_splats(field, scene.prepared_edits)
+    changed = changed_splats(splats, scene.prepared_edits)
     assert len(edits.sources) == 60 and (np.sort(order[edits.sources]) == np.arange(600, 660)).all()
     place = np.argsort(order)[changed.sources]
     means = changed.splats.means[np.argsort(place, kind="stable")]
@@ -158,6 +162,20 @@ def test_what_an_earlier_edit_was_filled_with_stays_beside_a_paste(tmp_path: Pat
     (far,) = scene.with_edits(EditStack([far])).prepared_edits
     alone, both = (seen(scene.field, PreparedStack(edits)) for edits in ([gone], [gone, far]))  # type: ignore[arg-type]
     assert psnr(both, alone) > 60.0 > psnr(seen(scene.field, PreparedStack([far])), alone) + 20.0  # type: ignore[arg-type]
+
+
+def test_a_patch_over_a_paste_belongs_to_the_scenes_field(tmp_path: Path) -> None:
+    """Its rows are those of every set of the scene, whatever else is pasted."""
+    Scene(room(True)).save(tmp_path / "box")
+    scene = Scene(room(True), folder=tmp_path / "floor")
+    far = Edit.paste("../box", cage()).replace(relight="none").translate((9.0, 0.0, 0.0))
+    below = scene.with_edits(EditStack([far])).prepared_edits
+    gone = Edit.delete(cage())
+    patch = build_splat_patch(scene.rendered_field, below, gone, LIGHT)  # type: ignore[arg-type]
+    assert patch.field is scene.field and len(patch.sources) > 50
+    shown = PreparedStack([*below, PreparedEdit(gone, patch)])
+    alone = PreparedStack([PreparedEdit(gone, build_splat_patch(scene.field, EditStack(), gone, LIGHT))])  # type: ignore[arg-type]
+    assert psnr(seen(scene.field, shown), seen(scene.field, alone)) > 60.0  # type: ignore[arg-type]
 
 
 def test_kinds_that_do_not_go_together(folder: Path, tmp_path: Path) -> None:

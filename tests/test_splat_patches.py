@@ -131,7 +131,6 @@ def test_a_shadow_has_an_edge_on_splats_that_are_longer_than_that(
     wanted = plain.rgb * np.exp(np.interp(where, x, log))[..., None]
 
     def off() -> float:
-        splitting.known_splits.clear()
         shown = SplatRenderer(field).with_edits(PreparedStack([edit])).render(camera, background="black")
         return db(shown.rgb, wanted)
 

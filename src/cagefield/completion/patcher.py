@@ -32,6 +32,7 @@ from cagefield.edits.patch import Pasted, Patch, SplatPatch
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.images.render_result import RenderResult
+from cagefield.rendering.splats.splat_provenance import SplatSet
 
 MAX_CACHED_PATCHES = 16
 """Maximum number of patches in memory."""
@@ -61,13 +62,15 @@ class Patcher:
 
     def __init__(
         self,
-        field: VoxelField | SplatField,
+        field: VoxelField | SplatField | SplatSet,
         cameras: Sequence[Camera],
         render: Callable[[Camera], RenderResult],
         pastes: PasteLoader | None = None,
     ) -> None:
-        self._field, self._cameras, self._render, self._pastes = field, cameras, render, pastes
-        self._disk_cache = DiskCache(field, cameras)
+        self._content = field if isinstance(field, VoxelField) else SplatSet.from_field(field)
+        self._field = self._content if isinstance(self._content, VoxelField) else self._content.field
+        self._cameras, self._render, self._pastes = cameras, render, pastes
+        self._disk_cache = DiskCache(self._field, cameras)
         self._cache: OrderedDict[Key, Patch | SplatPatch | PreparedEdit | None] = OrderedDict()
         self._light_block: tuple[Key, GridBlock] | None = None
         self._directional_models: dict[tuple[float, float, float] | None, LightModel] = {}
@@ -240,9 +243,9 @@ class Patcher:
         )
 
         def make() -> Patch | SplatPatch:
-            if isinstance(self._field, VoxelField):
+            if isinstance(self._content, VoxelField):
                 return build_patch(
-                    self._field,
+                    self._content,
                     below,
                     edit,
                     model,
@@ -252,7 +255,7 @@ class Patcher:
                     pasted=pasted,
                 )
             return build_splat_patch(
-                self._field,
+                self._content,
                 below,
                 edit,
                 model,
@@ -280,16 +283,16 @@ class Patcher:
             return cast("PreparedEdit | None", self._cache[key])
 
         def make() -> Patch | SplatPatch | None:
-            if isinstance(self._field, VoxelField):
+            if isinstance(self._content, VoxelField):
                 # The block below a cage stays the same over many drags of the cage.
                 block_key: Key = (*below.steps, edit.outer, model)
                 if self._light_block is None or self._light_block[0] != block_key:
-                    self._light_block = block_key, extract_bent_block(self._field, below, edit, model)
+                    self._light_block = block_key, extract_bent_block(self._content, below, edit, model)
                 light = relight_voxels(
-                    self._field, below, edit, model, self._light_block[1], self._visibility
+                    self._content, below, edit, model, self._light_block[1], self._visibility
                 )
             else:
-                light = relight_splats(self._field, below, edit, model, self._visibility)
+                light = relight_splats(self._content, below, edit, model, self._visibility)
             return None if light is None else light.patch
 
         patch = self._disk_cache.get_or_make(("light", model, *below.steps, edit), make)

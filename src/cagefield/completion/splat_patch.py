@@ -33,7 +33,7 @@ from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import Cage
 from cagefield.rendering.splats.bake_splats import where_they_are
 from cagefield.rendering.splats.splat_motion import MovedSplats, moved_splats
-from cagefield.rendering.splats.splat_provenance import with_pasted
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.typing import AnyArray, Array, Mask
 
 MIN_FILL_DIFFERENCE = 0.2
@@ -41,7 +41,7 @@ MIN_FILL_DIFFERENCE = 0.2
 
 
 def build_splat_patch(
-    field: SplatField,
+    splats: SplatField | SplatSet,
     below: EditMap,
     edit: Discrete,
     model: LightModel | None,
@@ -54,20 +54,21 @@ def build_splat_patch(
     # No feathering: splats overlap, and their seams are soft.
     edit = edit.replace(feather=0.0)
     stack = below.followed_by(PreparedEdit(edit, pasted=pasted))
-    field = with_pasted(field, stack)
+    splats = SplatSet.from_field(splats).with_pastes(stack)
+    field = splats.field
     active_model = model if model is not None and model.has_effect else LightModel((), ())
     to_destination = include_destination and not isinstance(edit, Delete)
     moved = _crop_splats(
         field,
-        moved_splats(field, below),
+        moved_splats(splats, below),
         _include_clone_source(
             edit,
             patch_box(edit, 0.0, active_model.max_radius, shadow_directions=active_model.shadow_directions),
         ),
     )
-    splats = where_they_are(field, moved)
+    placed = where_they_are(field, moved)
     voxel = choose_voxel_size(
-        splats,
+        placed,
         patch_box(
             edit,
             0.0,
@@ -83,10 +84,10 @@ def build_splat_patch(
         include_destination=to_destination,
         shadow_directions=active_model.shadow_directions,
     ) + 3.0 * voxel * np.array([[-1.0], [1.0]])
-    grid = voxelize_splats(splats, _include_clone_source(edit, box), voxel)
+    grid = voxelize_splats(placed, _include_clone_source(edit, box), voxel)
     after = None
     if isinstance(edit, Paste):
-        shown = _crop_splats(field, moved_splats(field, stack), box)
+        shown = _crop_splats(field, moved_splats(splats, stack), box)
         after = voxelize_splats(where_they_are(field, shown), _include_clone_source(edit, box), voxel)
     result = compute_patch(
         grid,
@@ -97,7 +98,7 @@ def build_splat_patch(
         visibility=None if below.steps else visibility,
         after=after,
     )
-    known, new = KnownSplats.from_moved(field, splats, grid, moved), NO_SPLATS
+    known, new = KnownSplats.from_moved(field, placed, grid, moved), NO_SPLATS
     is_new = result.under.changed_from(result.emptied, MIN_FILL_DIFFERENCE)
     if isinstance(edit.fill, Clone) and edit.uncovers:
         new = known.clone_cage(result.under, edit.inner, edit.fill.source)
@@ -105,28 +106,29 @@ def build_splat_patch(
         new = known.fill_surface(result.under, is_new, result.context.region, edit.inner, result.support)
     part = None if result.part_light is None else _to_new_light(result.before, result.part_light)
     light = _to_new_light(result.under, result.light)
-    return known.build_patch(field, result.context.region, is_new & ~result.inside, light, part, new)
+    return known.build_patch(splats.scene, result.context.region, is_new & ~result.inside, light, part, new)
 
 
 def relight_splats(
-    field: SplatField,
+    splats: SplatField | SplatSet,
     below: EditMap,
     edit: Continuous,
     model: LightModel,
     visibility: CameraVisibility | None = None,
 ) -> PreparedEdit:
     """Edit that changes the light of splats under a continuous edit (`completion.continuous_relighting`)."""
-    field = with_pasted(field, below)
+    splats = SplatSet.from_field(splats).with_pastes(below)
+    field = splats.field
     box = light_box(edit, 0.0, model.max_radius, model.shadow_directions)
-    moved = _crop_splats(field, moved_splats(field, below), box)
-    splats = where_they_are(field, moved)
-    voxel = choose_voxel_size(splats, box)
+    moved = _crop_splats(field, moved_splats(splats, below), box)
+    placed = where_they_are(field, moved)
+    voxel = choose_voxel_size(placed, box)
     box = light_box(edit, voxel, model.max_radius, model.shadow_directions)
-    region, grid = Cage.box(box.mean(axis=0), box[1] - box[0]), voxelize_splats(splats, box, voxel)
+    region, grid = Cage.box(box.mean(axis=0), box[1] - box[0]), voxelize_splats(placed, box, voxel)
     block = extract_block(grid, EditStack(), box)
     bent = compute_bent_light(block, edit, model)
     relit, light = apply_bent_light(block, bent)
-    known = KnownSplats.from_moved(field, splats, grid, moved)
+    known = KnownSplats.from_moved(field, placed, grid, moved)
     new, is_new = NO_SPLATS, np.zeros(block.shape, bool)
     if edit.fill == "surroundings":
         under, support = inpaint_shaded_support(
@@ -135,7 +137,9 @@ def relight_splats(
         if support is not None:
             is_new = under.changed_from(relit, MIN_FILL_DIFFERENCE)
             new = known.fill_surface(under, is_new, region, edit.inner, support)
-    return light_edit(edit, known.build_patch(field, region, is_new, _to_new_light(block, light), None, new))
+    return light_edit(
+        edit, known.build_patch(splats.scene, region, is_new, _to_new_light(block, light), None, new)
+    )
 
 
 def _include_clone_source(edit: Edit, box: Array) -> Array:

@@ -27,6 +27,7 @@ from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import Cage
 from cagefield.rendering.edited_field import EditedField, edited_bounds
 from cagefield.rendering.splats.bake_splats import baked_splats
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.scene.scene import Scene
 from cagefield.training.splats.splat_config import SplatConfig
 
@@ -53,9 +54,10 @@ Cameras = tuple[tuple[Camera, ...], tuple[Camera, ...]]
 
 def edited_splats(scene: Scene) -> SplatField:
     """The splats of a scene of splats as its edits make them. Raises EditError for an edit that cannot be."""
-    if not isinstance(scene.field, SplatField):
+    splats = scene.rendered_field
+    if not isinstance(splats, SplatSet):
         raise CagefieldError("the scene holds voxels, no splats; fit splats to it")
-    return baked_splats(scene.field, scene.prepared_edits, preserve_opacity=scene.preserve_opacity)
+    return baked_splats(splats, scene.prepared_edits, preserve_opacity=scene.preserve_opacity)
 
 
 def fitted_splats(

@@ -99,7 +99,7 @@ class SplatPathState:
         turns = np.eye(3)[None] if splats.rotations is None else splats.rotations.astype(np.float64)
         turns = np.broadcast_to(turns, (len(splats), 3, 3))[rows]
         stretches = turns.transpose(0, 2, 1) @ changed.jacobian[rows]
-        fields = [field] if split is None else [field, split.children]
+        fields = [field] if split is None else [field, split.children.field]
         made_of = changed.rows[rows]
         return cls(
             np.packbits(changed.hidden[order], bitorder="little"),

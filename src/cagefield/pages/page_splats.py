@@ -36,7 +36,7 @@ from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats.morton import morton_codes
 from cagefield.pages.page_file import pack, unpack
 from cagefield.rendering.splats.rasterizer import near_depth
-from cagefield.rendering.splats.splat_provenance import at_rest
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.typing import AnyArray, Float32
 
 MAGIC, VERSION = b"cagespla", 1
@@ -88,19 +88,21 @@ def page_order(field: SplatField) -> NDArray[np.int64]:
 
 
 def encode_page_splats(
-    field: SplatField, *, background: tuple[float, float, float] | None = (1.0, 1.0, 1.0)
+    splats: SplatField | SplatSet, *, background: tuple[float, float, float] | None = (1.0, 1.0, 1.0)
 ) -> bytes:
-    """The file of a field. Raises FieldError for a field without splats, and for one of discs.
+    """The file of splats. Raises FieldError for a field without splats, and for one of discs.
 
-    Pasted splats (`splat_provenance.with_pasted`) have opacity 0 in it: the file of the edits shows them.
+    Pasted splats (`SplatSet.with_pastes`) have opacity 0 in it: the file of the edits shows them.
     """
+    splats = SplatSet.from_field(splats)
+    field = splats.field
     if not len(field):
         raise FieldError("the field is empty: it has no splats to show")
     if field.discs:
         raise FieldError("the server draws this scene: its splats are discs (2DGS), which pages do not draw")
     order, ends = _layout(field)
     centre = field.center
-    shown = np.where(at_rest(field), np.float32(0.0), field.opacities)
+    shown = np.where(splats.is_pasted, np.float32(0.0), field.opacities)
     steps = np.maximum(np.abs(field.sh[:, 1:]).max(axis=(0, 2), initial=0.0) / 127.0, SH_STEP)
     levels, arrays = [], {}
     for number, (first, end) in enumerate(zip((0, *ends), ends, strict=False)):

@@ -21,7 +21,6 @@ from cagefield.cameras.keyframes import Keyframe, stills
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
 from cagefield.exporting import FOV_X
-from cagefield.fields.splat_field import SplatField
 from cagefield.files.atomic import recover_folder, replaced_folder
 from cagefield.pages.page_edits import encode_page_edits, for_pages
 from cagefield.pages.page_field import encode_page_field
@@ -31,7 +30,7 @@ from cagefield.pages.page_splats import encode_page_splats
 from cagefield.pages.path_states import PathEdits, path_edits
 from cagefield.pages.splat_path_states import splat_path_edits
 from cagefield.rendering.splats.raster_splats import changed_splats
-from cagefield.rendering.splats.splat_provenance import with_pasted
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.splats.splitting import split_of
 from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.scene.scene import Scene
@@ -84,8 +83,8 @@ class ScenePage:
             CagefieldError: the scene holds discs (2DGS).
             EditError: edits that cannot be evaluated, or more than a page takes.
         """
-        field = scene.field
-        if isinstance(field, SplatField):
+        field = scene.rendered_field
+        if isinstance(field, SplatSet):
             found, along = _splat_files(scene, field, keys, loop, on_progress)
         else:
             plain = VoxelRenderer(field, EditStack([]), preserve_opacity=scene.preserve_opacity)
@@ -98,7 +97,7 @@ class ScenePage:
         header = {
             "start": _view(_start(scene)),
             "up": scene.up.tolist(),
-            "centre": field.center.tolist(),
+            "centre": scene.field.center.tolist(),
             "background": None if scene.background is None else list(scene.background),
             "path": _path(keys, loop),
         }
@@ -155,26 +154,26 @@ def write_folder(folder: Path, written: Mapping[str, bytes]) -> None:
 
 def _splat_files(
     scene: Scene,
-    field: SplatField,
+    splats: SplatSet,
     keys: tuple[Keyframe, ...],
     loop: bool,
     on_progress: Callable[[float], None],
 ) -> tuple[dict[str, bytes], PathEdits | None]:
     """(files by name, edits along the path) of a scene of splats."""
-    if field.discs:
+    if splats.field.discs:
         raise CagefieldError(
             "the scene's splats are discs (2DGS), which pages do not draw; "
             "export them as .ply, or render a video"
         )
     preserve_opacity, edits = scene.preserve_opacity, scene.prepared_edits
-    field = with_pasted(field, edits)
-    found = {"field": encode_page_splats(field, background=scene.background)}
+    splats = splats.with_pastes(edits)
+    found = {"field": encode_page_splats(splats, background=scene.background)}
     if edits.steps:
-        split = split_of(field, edits)
-        changed = changed_splats(field, edits, preserve_opacity=preserve_opacity, split=split)
-        found["edits"] = encode_page_splat_edits(field, changed, packed=True)
+        split = split_of(splats, edits)
+        changed = changed_splats(splats, edits, preserve_opacity=preserve_opacity, split=split)
+        found["edits"] = encode_page_splat_edits(splats.field, changed, packed=True)
     along = splat_path_edits(
-        field,
+        splats,
         scene.edits,
         keys,
         loop,

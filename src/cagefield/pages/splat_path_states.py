@@ -14,7 +14,7 @@ from cagefield.fields.splat_field import SplatField
 from cagefield.pages.page_splat_path import SPLAT_BYTES, SplatPathState, encode_page_splat_path
 from cagefield.pages.path_states import MOST_STATES, PathEdits, parts_at, stack_at, state_times
 from cagefield.rendering.splats.raster_splats import changed_splats
-from cagefield.rendering.splats.splat_provenance import with_pasted
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.splats.splitting import Split, split_of
 
 BUDGET = 48 << 20
@@ -25,7 +25,7 @@ LEAST_STATES = 8
 
 
 def splat_path_edits(
-    field: SplatField,
+    splats: SplatField | SplatSet,
     edits: EditStack,
     keys: Sequence[Keyframe],
     loop: bool,
@@ -41,13 +41,14 @@ def splat_path_edits(
     on_way = patcher.prepare(edits.edits, stage=PatchStage.INPAINTED)
     whole = patcher.prepare(edits.edits, relight_continuous=False)
     # With all that is pasted, also in states without it.
-    field = with_pasted(field, whole)
+    splats = SplatSet.from_field(splats).with_pastes(whole)
+    field = splats.field
 
     # Split for the whole edits, once, so that the same splats are on their way in all states.
-    split: Split | None = split_of(field, whole)
+    split: Split | None = split_of(splats, whole)
 
     def state(stack: PreparedStack) -> SplatPathState:
-        changed = changed_splats(field, stack, preserve_opacity=preserve_opacity, split=split)
+        changed = changed_splats(splats, stack, preserve_opacity=preserve_opacity, split=split)
         return SplatPathState.build(field, changed, split)
 
     line = Timeline(keys, loop=loop)

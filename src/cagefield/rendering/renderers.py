@@ -10,6 +10,7 @@ from cagefield.edits import EditMap
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.images.render_result import Background, RenderResult
+from cagefield.rendering.splats.splat_provenance import SplatSet
 
 
 class Renderer(Protocol):
@@ -63,13 +64,16 @@ class InteractiveRenderer(Renderer, Protocol):
 
 
 def renderer_of(
-    field: VoxelField | SplatField, edits: EditMap | None = None, *, preserve_opacity: bool = True
+    field: VoxelField | SplatField | SplatSet,
+    edits: EditMap | None = None,
+    *,
+    preserve_opacity: bool = True,
 ) -> InteractiveRenderer:
     """The renderer of the field's kind under the edits: the march through voxels, the rasterizer of splats.
 
     Raises EditError where an edit cannot be evaluated, DeviceError where no device starts.
     """
-    if isinstance(field, SplatField):
+    if isinstance(field, SplatField | SplatSet):
         from cagefield.rendering.splats.splat_renderer import SplatRenderer
 
         return SplatRenderer(field, edits, preserve_opacity=preserve_opacity)

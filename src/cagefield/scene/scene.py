@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     from cagefield.completion.patcher import Patcher
     from cagefield.datasets import Dataset
     from cagefield.rendering.renderers import InteractiveRenderer, Renderer
+    from cagefield.rendering.splats.splat_provenance import SplatSet
 
     class Trained(Protocol):
         """Trained field, with the exposure gains [V,3] of the training photos, None without."""
@@ -297,6 +298,7 @@ class Scene:
             raise SceneError(f"edits must be an EditStack, got {type(edits).__name__}; give EditStack([...])")
         scene = dataclasses.replace(self, edits=edits)
         scene.__dict__["_origin"] = self.__dict__.get("renderer", self.__dict__.get("_origin"))
+        scene.__dict__["rendered_field"] = self.rendered_field
         for shared in ("patcher", "_pasting"):
             if shared in self.__dict__:
                 scene.__dict__[shared] = self.__dict__[shared]
@@ -403,6 +405,15 @@ class Scene:
         return NerfRenderer(original, exact, self.preserve_opacity)
 
     @cached_property
+    def rendered_field(self) -> VoxelField | SplatSet:
+        """Voxels, or the set of the splats, which caches results of edits; shared by `with_edits`."""
+        if isinstance(self.field, VoxelField):
+            return self.field
+        from cagefield.rendering.splats.splat_provenance import SplatSet
+
+        return SplatSet.from_field(self.field)
+
+    @cached_property
     def renderer(self) -> InteractiveRenderer:
         """The renderer of the field's kind; a scene made by `with_edits` shares the field's arrays."""
         from cagefield.rendering.renderers import renderer_of
@@ -411,7 +422,7 @@ class Scene:
         edits = self.prepared_edits
         if origin is not None:
             return origin.with_edits(edits, preserve_opacity=self.preserve_opacity)
-        return renderer_of(self.field, edits, preserve_opacity=self.preserve_opacity)
+        return renderer_of(self.rendered_field, edits, preserve_opacity=self.preserve_opacity)
 
     @cached_property
     def patcher(self) -> Patcher:
@@ -420,12 +431,13 @@ class Scene:
         from cagefield.completion.patcher import Patcher
         from cagefield.rendering.renderers import renderer_of
 
-        plain = cache(lambda: renderer_of(self.field))
+        plain = cache(lambda: renderer_of(self.rendered_field))
 
         def render(camera: Camera) -> RenderResult:
             return plain().render(camera, background="black", normals=True)
 
-        return Patcher(self.field, self.cameras.get("train", ()), render, PasteLoader(self.sources))
+        cameras = self.cameras.get("train", ())
+        return Patcher(self.rendered_field, cameras, render, PasteLoader(self.sources))
 
     @property
     def prepared_edits(self) -> PreparedStack:

@@ -236,7 +236,7 @@ def _uniform_position(field: VoxelField, vertex: NDArray[np.int64]) -> Array:
 def _extract_splats(source: SplatField, content: SourceContent, cage: Cage, field: SplatField) -> SplatField:
     """Splats in a cage of another scene; those that its faces cut are split."""
     edited = baked_splats(source, content.edits, preserve_opacity=content.preserve_opacity)
-    edited = split_for_edits(edited, EditStack([Edit.delete(cage)]))
+    edited = split_for_edits(edited, EditStack([Edit.delete(cage)])).field
     inside = cage.contains(edited.means.astype(np.float64))
     if not inside.any():
         raise EditError("its cage holds nothing of that scene; move it over something (inner)")

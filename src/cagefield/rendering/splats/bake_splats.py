@@ -19,13 +19,13 @@ from cagefield.fields.sh_rotation import rotate_sh_each
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.quaternions import quaternions_from_matrices, rotation_matrices
 from cagefield.rendering.splats.splat_motion import MovedSplats, moved_splats
-from cagefield.rendering.splats.splat_provenance import with_pasted
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.splats.splitting import split_of
 from cagefield.typing import Array, Float32
 
 
 def baked_splats(
-    field: SplatField, edits: EditMap, *, preserve_opacity: bool = True, split: bool = True
+    splats: SplatField | SplatSet, edits: EditMap, *, preserve_opacity: bool = True, split: bool = True
 ) -> SplatField:
     """The splats that edits make of a field; those that no edit reaches come first, as they were.
 
@@ -34,15 +34,16 @@ def baked_splats(
     Raises:
         EditError: an edit that cannot be evaluated.
     """
+    splats = SplatSet.from_field(splats).with_pastes(edits)
+    field = splats.field
     if not edits.steps:
         return field
-    field = with_pasted(field, edits)
-    moved = moved_splats(field, edits)
+    moved = moved_splats(splats, edits)
     parts = []
-    found = split_of(field, edits) if split else None
+    found = split_of(splats, edits) if split else None
     if found is not None:
         moved = moved.without(found.parents)
-        parts.append(_baked(found.children, moved_splats(found.children, edits), preserve_opacity))
+        parts.append(_baked(found.children.field, moved_splats(found.children, edits), preserve_opacity))
     parts.insert(0, _baked(field, moved, preserve_opacity))
     boxes = np.concatenate([field.bounds[None], *(step.boxes for step in edits.steps)])
     means, log_scales, quaternions, opacities, sh = (

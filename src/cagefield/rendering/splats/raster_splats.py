@@ -19,17 +19,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.edits import EditMap
 from cagefield.fields.sh import scale_sh_colors
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.rendering.splats.splat_motion import MovedSplats, moved_splats
-from cagefield.rendering.splats.splat_provenance import with_pasted
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.typing import Array, Float32, Mask
 
 if TYPE_CHECKING:
@@ -73,26 +73,28 @@ class DeformedSplats:
     @classmethod
     def of_field(cls, field: SplatField) -> DeformedSplats:
         """The splats of a field without edits, made once while it lives."""
-        found = _of_fields.get(field)
-        if found is None:
-            covariances = _frozen(covariances_of(field.quaternions, field.log_scales))
-            tangents = _frozen(_tangents_of(field)) if field.discs else None
-            found = cls(
-                field.means, covariances, field.opacities, field.sh, None, field.antialiased, tangents
-            )
-            _of_fields[field] = found
-        return found
+        return _undeformed_splats(field)
+
+
+@memoized_weakly
+def _undeformed_splats(field: SplatField) -> DeformedSplats:
+    return DeformedSplats(
+        field.means,
+        _frozen(covariances_of(field.quaternions, field.log_scales)),
+        field.opacities,
+        field.sh,
+        antialiased=field.antialiased,
+        tangents=_frozen(_tangents_of(field)) if field.discs else None,
+    )
 
 
 NO_ROTATIONS: Float32 = np.empty((0, 3, 3), np.float32)
 """Kernel argument for rotations where no splat is rotated."""
 NO_ROTATIONS.setflags(write=False)
 
-_of_fields: WeakKeyDictionary[SplatField, DeformedSplats] = WeakKeyDictionary()
-
 
 def deformed_splats(
-    field: SplatField,
+    splats: SplatField | SplatSet,
     edits: EditMap,
     *,
     preserve_opacity: bool = True,
@@ -104,21 +106,21 @@ def deformed_splats(
 
     A splat goes with its mean as a whole, see `moved_splats`, or its children do in its place, where it is
     `split`; those that no edit reaches are as they were, bit for bit. Maps are exact, whatever lattices the
-    edits have, and kept between calls for stacks that begin alike. `coarse` integrates a flow shell with long
-    steps, for pictures while something moves. `proceed` is called now and then, and gives the work up by
-    raising.
+    edits have, and kept for a living SplatSet and stacks that begin alike. `coarse` integrates a flow shell
+    with long steps, for pictures while something moves. `proceed` is called now and then, and gives the work
+    up by raising.
 
     Raises:
         EditError: an edit that cannot be evaluated.
     """
-    field = with_pasted(field, edits)
-    moved = moved_splats(field, edits, coarse=coarse, proceed=proceed)
+    splats = SplatSet.from_field(splats).with_pastes(edits)
+    moved = moved_splats(splats, edits, coarse=coarse, proceed=proceed)
     children = None
     if split is not None:
         moved = moved.without(split.parents)
         others = moved_splats(split.children, edits, coarse=coarse, proceed=proceed)
-        children = _deformed(split.children, others, preserve_opacity, None)
-    return _deformed(field, moved, preserve_opacity, children)
+        children = _deformed(split.children.field, others, preserve_opacity, None)
+    return _deformed(splats.field, moved, preserve_opacity, children)
 
 
 def _deformed(
@@ -176,7 +178,7 @@ def _carried(
 class ChangedSplats:
     """Difference between an edited and an unedited field of N splats: M new splats, and the hidden ones.
 
-    N counts those that edits paste (`pasted_splats.with_pasted`), which are hidden where they are.
+    N counts those that edits paste (`SplatSet.with_pastes`), which are hidden where they are.
 
     Attributes:
         hidden: [N], True where the field's splat is not shown as it is.
@@ -196,7 +198,7 @@ class ChangedSplats:
 
 
 def changed_splats(
-    field: SplatField,
+    splats: SplatField | SplatSet,
     edits: EditMap,
     *,
     preserve_opacity: bool = True,
@@ -205,16 +207,17 @@ def changed_splats(
     proceed: Callable[[], None] | None = None,
 ) -> ChangedSplats:
     """How `deformed_splats`, with the same arguments, differ from the field's own."""
-    field = with_pasted(field, edits)
-    moved = moved_splats(field, edits, coarse=coarse, proceed=proceed)
+    splats = SplatSet.from_field(splats).with_pastes(edits)
+    moved = moved_splats(splats, edits, coarse=coarse, proceed=proceed)
     if split is not None:
         moved = moved.without(split.parents)
+    field = splats.field
     means, covariances, own, rotations = _carried(field, moved, preserve_opacity)
     opacities = field.opacities[moved.source] if own is None else own
     sources, made_of, jacobian, gains = moved.source, moved.source, moved.jacobian, moved.gains
     if split is not None:
         others = moved_splats(split.children, edits, coarse=coarse, proceed=proceed)
-        more = _deformed(split.children, others, preserve_opacity, None)
+        more = _deformed(split.children.field, others, preserve_opacity, None)
         resting = np.flatnonzero(~others.left)
         rows = np.concatenate([resting, others.source])
         in_order = np.argsort(rows) if others.is_whole else np.arange(len(rows))

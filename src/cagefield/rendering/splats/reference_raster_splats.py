@@ -8,18 +8,18 @@ from cagefield.edits import Copy, Edit, EditMap, EditStack, Paste, PreparedStack
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.rendering.splats.raster_splats import DeformedSplats
-from cagefield.rendering.splats.splat_provenance import at_rest, pasted_rows, with_pasted
+from cagefield.rendering.splats.splat_provenance import SplatSet
 
 
 def deformed_splats_reference(
-    field: SplatField, edits: EditMap, *, preserve_opacity: bool = True
+    splats: SplatField | SplatSet, edits: EditMap, *, preserve_opacity: bool = True
 ) -> DeformedSplats:
     """The splats that edits make of a field, in any order: those of all that is shown of each splat's mean.
 
     Each edit alone is `EditStack.to_deformed` of a stack of one; a copy leaves the original besides.
     """
-    field = with_pasted(field, edits)
-    source = np.flatnonzero(~at_rest(field))
+    splats = SplatSet.from_field(splats).with_pastes(edits)
+    field, source = splats.field, np.flatnonzero(~splats.is_pasted)
     p, J = field.means[source].astype(np.float64), np.tile(np.eye(3), (len(source), 1, 1))
     for step in edits.steps:
         edit = step.edit
@@ -27,7 +27,7 @@ def deformed_splats_reference(
         shown = ~mapped.hidden
         parts = [(source[shown], mapped.points[shown], (mapped.jacobian @ J)[shown])]
         if isinstance(edit, Paste):
-            rows = pasted_rows(field, step)
+            rows = splats.pasted_rows(step)
             there = EditStack([Edit.move(edit.inner, operations=edit.operations)])
             moved = there.to_deformed(field.means[rows])
             inside = edit.inner.contains(field.means[rows].astype(np.float64))

@@ -17,16 +17,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.edits import Edit, EditMap, Paste, PreparedEdit
 from cagefield.edits.patch import SplatPatch
 from cagefield.fields.sh import scale_sh_colors
 from cagefield.fields.splat_field import SplatField
-from cagefield.rendering.splats.splat_provenance import at_rest, of_same_scene, pasted_rows
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.typing import Array, Mask
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.forward import to_deformed
@@ -36,10 +36,10 @@ MIN_LOG_GAIN = 0.01
 """The log of a change of light that is left out."""
 
 KEPT_STACKS = 6
-"""Stacks of edits of one field whose splats are kept, so that a longer stack begins where they end."""
+"""Stacks of edits of one set whose splats are kept, so that a longer stack begins where they end."""
 
 KEPT_SPLATS = 4_000_000
-"""Most moved splats that are kept of one field, 104 bytes each; the stack shown last is kept in any case."""
+"""Most moved splats that are kept of one set, 104 bytes each; the stack shown last is kept in any case."""
 
 
 @dataclass(frozen=True)
@@ -67,10 +67,10 @@ class MovedSplats:
         return scale_sh_colors(harmonics[self.source], self.gains)
 
     @classmethod
-    def at_rest(cls, field: SplatField) -> MovedSplats:
-        """A field's splats, all in their places; those that edits are to paste are shown nowhere."""
+    def at_rest(cls, splats: SplatSet) -> MovedSplats:
+        """Splats, all in their places; those that edits are to paste are shown nowhere."""
         none = np.zeros((0, 3))
-        return cls(at_rest(field), np.zeros(0, np.int64), none, np.zeros((0, 3, 3)))
+        return cls(splats.is_pasted, np.zeros(0, np.int64), none, np.zeros((0, 3, 3)))
 
     @property
     def is_at_rest(self) -> bool:
@@ -91,33 +91,31 @@ class MovedSplats:
         return MovedSplats(self.left | gone, self.source[kept], self.points[kept], self.jacobian[kept], gains)
 
     def then(
-        self, step: PreparedEdit, field: SplatField, coarse: bool, proceed: Callable[[], None] | None
+        self, step: PreparedEdit, splats: SplatSet, coarse: bool, proceed: Callable[[], None] | None
     ) -> MovedSplats:
         """Moved splats after one more edit. Raises `EditError` where it cannot be evaluated."""
-        moved, carried = self._moved(step, field.means, coarse, proceed)
+        moved, carried = self._moved(step, splats.field.means, coarse, proceed)
         if isinstance(step.edit, Paste):
-            moved, carried = moved._with(step, field)
+            moved, carried = moved._with(step, splats)
         if isinstance(step.patch, SplatPatch):
-            return moved._patched(step.edit, step.patch, field, carried)
+            return moved._patched(step.edit, step.patch, splats, carried)
         return moved
 
-    def _with(self, step: PreparedEdit, field: SplatField) -> tuple[MovedSplats, Array]:
+    def _with(self, step: PreparedEdit, splats: SplatSet) -> tuple[MovedSplats, Array]:
         """(these and the pasted splats of an edit, source positions [C,3] of those last rows)."""
-        rows = pasted_rows(field, step)
-        inside, points, jacobian = HexahedronMap(step.edit.deformed, step.edit.inner)(
-            field.means[rows].astype(np.float64)
-        )
+        rows = splats.pasted_rows(step)
+        positions = splats.field.means[rows].astype(np.float64)
+        inside, points, jacobian = HexahedronMap(step.edit.deformed, step.edit.inner)(positions)
         gains = None
         if self.gains is not None:
             gains = np.concatenate([self.gains, np.ones((len(points), 3))])
-        rows = rows[inside]
         return MovedSplats(
             self.left,
-            np.concatenate([self.source, rows]),
+            np.concatenate([self.source, rows[inside]]),
             np.concatenate([self.points, points]),
             np.concatenate([self.jacobian, jacobian]),
             gains,
-        ), field.means[rows].astype(np.float64)
+        ), positions[inside]
 
     def _moved(
         self, step: PreparedEdit, means: NDArray[np.float32], coarse: bool, proceed: Callable[[], None] | None
@@ -162,7 +160,7 @@ class MovedSplats:
         )
         return moved, points[come]
 
-    def _patched(self, edit: Edit, patch: SplatPatch, field: SplatField, carried: Array) -> MovedSplats:
+    def _patched(self, edit: Edit, patch: SplatPatch, splats: SplatSet, carried: Array) -> MovedSplats:
         """These with the patch of the edit that moved them; `carried` [C,3] is where its last rows were."""
         from cagefield.rendering.splats.kernels.deformation import in_boxes
 
@@ -171,10 +169,11 @@ class MovedSplats:
         if patch.part is not None and len(carried):
             gains[here:] *= np.exp(patch.part.at(carried))[:, None]
         # Splats that the edit leaves: those in their own places, and those that earlier edits took there.
-        inside = np.empty(len(field), bool)
-        in_boxes(field.means, patch.region.aabb[None], inside)
+        means = splats.field.means
+        inside = np.empty(len(means), bool)
+        in_boxes(means, patch.region.aabb[None], inside)
         still = np.flatnonzero(inside & ~self.left)
-        points = np.concatenate([field.means[still].astype(np.float64), self.points[:here]])
+        points = np.concatenate([means[still].astype(np.float64), self.points[:here]])
         outside = np.ones(len(points), bool) if isinstance(edit, Paste) else ~edit.inner.contains(points)
         gone = patch.takes_away(points) & outside
         log = np.where(outside, patch.light.at(points), 0.0)
@@ -190,7 +189,7 @@ class MovedSplats:
             (self.source[kept], self.points[kept], self.jacobian[kept], gains[kept]),
             (still[lit], points[lit], turn, np.tile(np.exp(log[lit])[:, None], 3)),
         ]
-        if of_same_scene(patch.field, field):
+        if patch.field is splats.scene:
             parts.append((patch.sources, patch.points, patch.jacobian, patch.gains))
         return MovedSplats(left, *(np.concatenate(column) for column in zip(*parts, strict=True)))
 
@@ -204,30 +203,33 @@ class _KnownStack:
     moved: MovedSplats
 
 
-known_stacks: WeakKeyDictionary[SplatField, list[_KnownStack]] = WeakKeyDictionary()
+@memoized_weakly
+def _known_stacks(splats: SplatSet) -> list[_KnownStack]:
+    """Latest results of `moved_splats` for a living set, most recent first."""
+    return []
 
 
 def moved_splats(
-    field: SplatField,
+    splats: SplatField | SplatSet,
     edits: EditMap,
     *,
     coarse: bool = False,
     proceed: Callable[[], None] | None = None,
 ) -> MovedSplats:
-    """A field's splats under edits, with those that they paste behind them (`pasted_splats.with_pasted`).
+    """Splats under edits; what these paste is part of the set (`SplatSet.with_pastes`).
 
     Raises `EditError` where an edit cannot be evaluated.
 
-    Results of the first edits are cached between calls. `coarse` and `proceed` as for `to_deformed`.
+    Results of the first edits are cached for a living set. `coarse` and `proceed` as for `to_deformed`.
     """
-    active = edits.steps
-    known = known_stacks.setdefault(field, [])
+    splats, active = SplatSet.from_field(splats), edits.steps
+    known = _known_stacks(splats)
     usable = [k for k in known if k.edits == active[: len(k.edits)] and (coarse or not k.coarse)]
     start = max(usable, key=lambda k: (len(k.edits), not k.coarse), default=None)
-    moved, count = (start.moved, len(start.edits)) if start else (MovedSplats.at_rest(field), 0)
+    moved, count = (start.moved, len(start.edits)) if start else (MovedSplats.at_rest(splats), 0)
     found = [start] if start else []
     for number, edit in enumerate(active[count:], start=count + 1):
-        moved = moved.then(edit, field, coarse, proceed)
+        moved = moved.then(edit, splats, coarse, proceed)
         found.append(_KnownStack(active[:number], coarse, moved))
     kept = [*reversed(found), *(k for k in known if k is not start)][:KEPT_STACKS]
     sizes = np.cumsum([len(k.moved.source) for k in kept])

@@ -1,15 +1,15 @@
-"""Provenance of splats: those of the scene, and those that edits paste from other scenes.
+"""SplatSet: splats with their provenance, the scene's own and those that edits paste from other scenes.
 
-Edits of splats are evaluated on one SplatField: the scene's own splats first, then those of
-each paste, in the other scene's space. These are not shown where they are, but where their paste takes them.
+Edits of splats are evaluated on one SplatField: the scene's own splats first, then those of each paste, in
+the other scene's space. The latter are not shown where they are, but where their paste takes them.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
-from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,110 +18,104 @@ from cagefield.edits import EditMap, Paste, PreparedEdit
 from cagefield.fields.splat_field import SplatField
 from cagefield.typing import Float32, Mask
 
-MAX_KEPT_FIELDS = 3
-"""Joined fields that are kept of one field."""
-
-Pasted = tuple[SplatField, ...]
+MAX_JOINED_SETS = 3
+"""Sets with pasted splats that a scene's set keeps, those used last."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Origins:
-    """Origins of a field's splats: index [N] into `pasted`, -1 for the scene's own.
+class SplatSet:
+    """N splats in canonical space, each that of its own scene.
 
-    `scene` is the scene's field, whose rows come first, None of splats that stand for others.
+    Sets are compared by identity: results of edits are cached for a living set. A scene's set also keeps the
+    latest sets `with_pastes`, so that equal pastes give the same object.
+
+    Attributes:
+        field: the splats.
+        scene: the scene's field, whose rows come first in `field`; the set's own field where splats stand for
+            others (`inherit_origins`).
+        origins: [N] int32, indices into `parts`; -1 for the scene's own splats.
+        parts: the fields of pasted splats.
     """
 
-    number: NDArray[np.int32]
-    pasted: Pasted
-    scene: ref[SplatField] | None = None
+    field: SplatField
+    scene: SplatField
+    origins: NDArray[np.int32]
+    parts: tuple[SplatField, ...] = ()
+    _joined: list[SplatSet] = dataclasses.field(default_factory=list, init=False, repr=False)
+
+    @classmethod
+    def from_field(cls, splats: SplatField | SplatSet) -> SplatSet:
+        """Set of a scene's field, all splats its own; a set itself."""
+        if isinstance(splats, SplatSet):
+            return splats
+        return cls(splats, splats, np.full(len(splats), -1, np.int32))
+
+    @classmethod
+    def concatenate(cls, sets: Sequence[SplatSet]) -> SplatSet:
+        """Set of the splats of several sets with equal `parts`, one after the other."""
+        field = _concatenate([each.field for each in sets])
+        return cls(field, field, np.concatenate([each.origins for each in sets]), sets[0].parts)
+
+    def __len__(self) -> int:
+        return len(self.field)
+
+    @property
+    def is_pasted(self) -> Mask:
+        """[N], True where a splat is pasted: it is not shown at its own place."""
+        return self.origins >= 0
+
+    def with_pastes(self, edits: EditMap) -> SplatSet:
+        """Set with the splats that active edits paste behind its own; itself without pastes, or with them
+        joined.
+
+        Harmonics get the highest degree of all. Pastes without their content are left out.
+        """
+        pasted = (step.pasted.splats for step in edits.steps if step.pasted is not None)
+        parts = tuple(dict.fromkeys(part for part in pasted if part is not None))
+        if self.parts or not parts:
+            return self
+        found = next((each for each in self._joined if each.parts == parts), None)
+        if found is None:
+            counts = [len(self), *(len(part) for part in parts)]
+            origins = np.repeat(np.arange(-1, len(parts), dtype=np.int32), counts)
+            found = SplatSet(_concatenate([self.field, *parts]), self.scene, origins, parts)
+        self._joined[:] = [found, *(each for each in self._joined if each is not found)][:MAX_JOINED_SETS]
+        return found
+
+    def pasted_rows(self, step: PreparedEdit) -> NDArray[np.int64]:
+        """Rows [K] of the splats that an edit pastes; none for an edit that does not.
+
+        Raises EditError for a paste without its content.
+        """
+        if not isinstance(step.edit, Paste):
+            return np.zeros(0, np.int64)
+        for number, part in enumerate(self.parts):
+            if step.pasted is not None and part is step.pasted.splats:
+                return np.flatnonzero(self.origins == number)
+        raise step.edit.unread()
+
+    def inherit_origins(self, field: SplatField, rows: NDArray[Any]) -> SplatSet:
+        """Set of a field whose splats stand for rows [M], or those True in a mask [N], of this one."""
+        return SplatSet(field, field, self.origins[rows], self.parts)
+
+    def take(self, rows: NDArray[Any]) -> SplatSet:
+        """Set of the splats of the given rows or mask."""
+        return self.inherit_origins(self.field.take(rows), rows)
 
 
-_joined: WeakKeyDictionary[SplatField, list[tuple[Pasted, SplatField]]] = WeakKeyDictionary()
-_origins: WeakKeyDictionary[SplatField, _Origins] = WeakKeyDictionary()
-
-
-def with_pasted(field: SplatField, edits: EditMap) -> SplatField:
-    """Field with the splats that active edits paste behind its own; itself without pastes, or with them
-    joined.
-
-    Equal pastes give the same object while it lives. Harmonics get the higher degree of both.
-    """
-    if field in _origins:
-        return field
-    pasted = tuple(dict.fromkeys(step.pasted.splats for step in edits.steps if step.pasted is not None))
-    splats = tuple(part for part in pasted if part is not None)
-    if not splats:
-        return field
-    known = _joined.setdefault(field, [])
-    found = next((joined for parts, joined in known if parts == splats), None)
-    if found is None:
-        found = _behind(field, splats)
-        counts = [len(field), *(len(part) for part in splats)]
-        numbers = np.repeat(np.arange(-1, len(splats), dtype=np.int32), counts)
-        _origins[found] = _Origins(numbers, splats, ref(field))
-    known[:] = [(splats, found), *(each for each in known if each[1] is not found)][:MAX_KEPT_FIELDS]
-    return found
-
-
-def pasted_rows(field: SplatField, step: PreparedEdit) -> NDArray[np.int64]:
-    """The rows of a joined field that an edit pastes; none for an edit that does not.
-
-    Raises EditError for a paste without its content.
-    """
-    if not isinstance(step.edit, Paste):
-        return np.zeros(0, np.int64)
-    origins = _origins.get(field)
-    for number, part in enumerate(() if origins is None else origins.pasted):
-        if origins is not None and step.pasted is not None and part is step.pasted.splats:
-            return np.flatnonzero(origins.number == number)
-    raise step.edit.unread()
-
-
-def at_rest(field: SplatField) -> Mask:
-    """[N], True where a splat is pasted: it is not shown at its own place."""
-    origins = _origins.get(field)
-    return np.zeros(len(field), bool) if origins is None else origins.number >= 0
-
-
-def of_same_scene(field: SplatField, other: SplatField) -> bool:
-    """True where rows of one field are rows of the other, whatever comes behind them."""
-    return _scene_of(field) is _scene_of(other)
-
-
-def _scene_of(field: SplatField) -> SplatField | None:
-    origins = _origins.get(field)
-    return origins.scene() if origins is not None and origins.scene is not None else field
-
-
-def descend(field: SplatField, ancestor: SplatField, rows: NDArray[Any]) -> SplatField:
-    """The field, whose splats are known to stand for rows (or those True in a mask) of another one."""
-    origins = _origins.get(ancestor)
-    if origins is not None:
-        _origins[field] = _Origins(origins.number[rows], origins.pasted)
-    return field
-
-
-def descend_from_all(field: SplatField, ancestors: Sequence[SplatField]) -> SplatField:
-    """Field with the origins of the splats of several fields, one after the other."""
-    known = [_origins[each] for each in ancestors if each in _origins]
-    if known:
-        _origins[field] = _Origins(np.concatenate([each.number for each in known]), known[0].pasted)
-    return field
-
-
-def _behind(field: SplatField, pasted: Pasted) -> SplatField:
-    terms = max(part.sh.shape[1] for part in (field, *pasted))
-    names = ("means", "log_scales", "quaternions", "opacities")
+def _concatenate(fields: Sequence[SplatField]) -> SplatField:
+    """Field of the splats of several fields; other attributes are those of the first one."""
     means, log_scales, quaternions, opacities = (
-        _read_only(np.concatenate([getattr(part, name) for part in (field, *pasted)])) for name in names
+        _read_only(np.concatenate([getattr(part, name) for part in fields]))
+        for name in ("means", "log_scales", "quaternions", "opacities")
     )
-    sh = np.zeros((len(means), terms, 3), np.float32)
+    sh = np.zeros((len(means), max(part.sh.shape[1] for part in fields), 3), np.float32)
     first = 0
-    for part in (field, *pasted):
+    for part in fields:
         sh[first : first + len(part), : part.sh.shape[1]] = part.sh
         first += len(part)
-    return replace(
-        field,
+    return dataclasses.replace(
+        fields[0],
         means=means,
         log_scales=log_scales,
         quaternions=quaternions,

@@ -26,6 +26,7 @@ from cagefield.rendering.splats.rasterizer import (
     project,
 )
 from cagefield.rendering.splats.splat_lod import MIN_CLUSTERED_SPLATS, Clusters
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.splats.splitting import split_of
 from cagefield.typing import Float32
 
@@ -41,6 +42,8 @@ MOVING_DETAIL = 1.0
 class SplatRenderer:
     """Renders one SplatField under one edit stack, with the same methods as `VoxelRenderer`.
 
+    Renderers of one SplatSet share its cached results.
+
     On a GPU the splats stay there between frames; see `splat_device`.
 
     The splats are deformed once, when the renderer is made; frames cost the same with edits and without.
@@ -53,17 +56,18 @@ class SplatRenderer:
 
     def __init__(
         self,
-        field: SplatField,
+        field: SplatField | SplatSet,
         edits: EditMap | None = None,
         *,
         preserve_opacity: bool = True,
     ) -> None:
         """Raises EditError where an edit cannot be evaluated."""
-        self.field = field
+        self._set = SplatSet.from_field(field)
+        self.field = self._set.field
         self.edits: EditMap = edits if edits is not None else EditStack([])
         self.preserve_opacity = preserve_opacity
         self.splats: DeformedSplats = deformed_splats(
-            field, self.edits, preserve_opacity=preserve_opacity, split=split_of(field, self.edits)
+            self._set, self.edits, preserve_opacity=preserve_opacity, split=split_of(self._set, self.edits)
         )
         self._buffers = Buffers()
         self._normals: Float32 | None = None
@@ -88,11 +92,11 @@ class SplatRenderer:
         if preserve_opacity is not None:
             other.preserve_opacity = preserve_opacity
         other.splats = deformed_splats(
-            self.field,
+            self._set,
             edits,
             preserve_opacity=other.preserve_opacity,
             coarse=coarse,
-            split=None if coarse else split_of(self.field, edits, proceed=proceed),
+            split=None if coarse else split_of(self._set, edits, proceed=proceed),
             proceed=proceed,
         )
         other._normals = other._arrays = None

@@ -41,14 +41,13 @@ Balakrishnan, "Continuous Univariate Distributions" (1994), chapter 13.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.edits import Copy, Delete, Discrete, Edit, EditMap, Paste, PreparedEdit, PreparedStack
 from cagefield.edits.patch import SplatPatch
 from cagefield.fields.splat_field import SplatField
@@ -62,7 +61,7 @@ from cagefield.rendering.splats.gaussian_profile import (
     part_between,
 )
 from cagefield.rendering.splats.splat_motion import MovedSplats, moved_splats
-from cagefield.rendering.splats.splat_provenance import descend, descend_from_all, with_pasted
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.typing import Array, Mask
 from cagefield.warps.forward import to_deformed
 
@@ -105,31 +104,32 @@ MORE = 200_000
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """Split splats of a field: `parents` [N] are True where `children` replace a splat.
+    """Split splats of a set: `parents` [N] are True where `children` replace a splat.
 
     `sources` [C] are the numbers of the children's parents.
     """
 
     parents: Mask
-    children: SplatField
+    children: SplatSet
     sources: NDArray[np.int64]
 
 
-def split_for_edits(field: SplatField, edits: EditMap) -> SplatField:
-    """The field with those splats split that one Gaussian each does not show under the edits.
+def split_for_edits(splats: SplatField | SplatSet, edits: EditMap) -> SplatSet:
+    """Set `with_pastes` with those splats split that one Gaussian each does not show under the edits.
 
-    The field itself where none is; children come last. Raises as `split_of`.
+    The set itself where none is; children come last. Raises as `split_of`.
     """
-    split, field = split_of(field, edits), with_pasted(field, edits)
-    return field if split is None else _joined([_taken(field, ~split.parents), split.children])
+    splats = SplatSet.from_field(splats).with_pastes(edits)
+    split = split_of(splats, edits)
+    return splats if split is None else SplatSet.concatenate([splats.take(~split.parents), split.children])
 
 
-def split_of(field: SplatField, edits: EditMap, *, proceed: Callable[[], None] | None = None) -> Split | None:
+def split_of(
+    splats: SplatField | SplatSet, edits: EditMap, *, proceed: Callable[[], None] | None = None
+) -> Split | None:
     """Split of the splats that one Gaussian each cannot represent under the edits, or None.
 
-    Pasted splats are counted behind the field's (`pasted_splats.with_pasted`).
-
-    Cached for a living field and its latest edits.
+    Rows are those of the set `with_pastes`. Cached for a living set and its latest edits.
 
     Raises:
         EditError: an edit that cannot be evaluated.
@@ -137,13 +137,13 @@ def split_of(field: SplatField, edits: EditMap, *, proceed: Callable[[], None] |
     active = edits.steps
     if not active:
         return None
-    field = with_pasted(field, edits)
-    known = known_splits.get(field)
-    if known is not None and known[0] == active:
-        return known[1]
-    most = (MOST - 1.0) * len(field) + MORE
-    parents = np.zeros(len(field), bool)
-    children: SplatField | None = None
+    splats = SplatSet.from_field(splats).with_pastes(edits)
+    known = _known_splits(splats)
+    if known and known[0][0] == active:
+        return known[0][1]
+    most = (MOST - 1.0) * len(splats) + MORE
+    parents = np.zeros(len(splats), bool)
+    children: SplatSet | None = None
     sources = np.zeros(0, np.int64)
     for count, step in enumerate(active):
         before = PreparedStack(active[:count])
@@ -151,33 +151,34 @@ def split_of(field: SplatField, edits: EditMap, *, proceed: Callable[[], None] |
         if children is not None:
             stay, others = _settled(children, before, step, None, most - len(children), proceed)
             parts = [
-                (_taken(children, stay), sources[stay]),
+                (children.take(stay), sources[stay]),
                 *((part, sources[rows]) for part, rows in others),
             ]
         stay, others = _settled(
-            field, before, step, parents, most - sum(len(part) for part, _ in parts), proceed
+            splats, before, step, parents, most - sum(len(part) for part, _ in parts), proceed
         )
         parents |= ~stay
         parts += others
         if parts:
-            children = _joined([part for part, _ in parts])
+            children = SplatSet.concatenate([part for part, _ in parts])
             sources = np.concatenate([rows for _, rows in parts])
     split = None if children is None else Split(parents, children, sources)
-    known_splits[field] = (active, split)
+    known[:] = [(active, split)]
     return split
 
 
-known_splits: WeakKeyDictionary[SplatField, tuple[tuple[PreparedEdit, ...], Split | None]] = (
-    WeakKeyDictionary()
-)
+@memoized_weakly
+def _known_splits(splats: SplatSet) -> list[tuple[tuple[PreparedEdit, ...], Split | None]]:
+    """Latest result of `split_of` for a living set, with its edits; none at first."""
+    return []
 
 
-_Part = tuple[SplatField, NDArray[np.int64]]
+_Part = tuple[SplatSet, NDArray[np.int64]]
 """Children, and the numbers of the splats that they are of."""
 
 
 def _settled(
-    field: SplatField,
+    splats: SplatSet,
     before: EditMap,
     step: PreparedEdit,
     gone: Mask | None,
@@ -185,8 +186,8 @@ def _settled(
     proceed: Callable[[], None] | None,
 ) -> tuple[Mask, list[_Part]]:
     """(which splats stay whole [N], children of the others), children split again where they must be."""
-    stay, done, found = np.ones(len(field), bool), list[_Part](), field
-    sources = np.arange(len(field))
+    stay, done, found = np.ones(len(splats), bool), list[_Part](), splats
+    sources = np.arange(len(splats))
     for turn in range(CUTS if isinstance(step.edit, Discrete) else ROUNDS):
         split = _split_once(found, before, step, gone if turn == 0 else None, room, proceed)
         if split is None:
@@ -194,10 +195,10 @@ def _settled(
         if turn == 0:
             stay = split[0]
         else:
-            done.append((_taken(found, split[0]), sources[split[0]]))
+            done.append((found.take(split[0]), sources[split[0]]))
         found, sources = split[1], sources[split[2]]
         room -= len(found)
-    return stay, done if found is field else [*done, (found, sources)]
+    return stay, done if found is splats else [*done, (found, sources)]
 
 
 @dataclass(frozen=True)
@@ -220,15 +221,15 @@ class _Children:
 
 
 def _split_once(
-    field: SplatField,
+    splats: SplatSet,
     before: EditMap,
     step: PreparedEdit,
     gone: Mask | None,
     room: float,
     proceed: Callable[[], None] | None,
-) -> tuple[Mask, SplatField, NDArray[np.int64]] | None:
+) -> tuple[Mask, SplatSet, NDArray[np.int64]] | None:
     """(which splats stay whole [N], the others' children, whose they are); None where all do, or are gone."""
-    moved = moved_splats(field, before, proceed=proceed)
+    field, moved = splats.field, moved_splats(splats, before, proceed=proceed)
     if gone is not None and gone.any():
         moved = moved.without(gone)
     rest, elsewhere = _near(step, field, moved)
@@ -247,7 +248,7 @@ def _split_once(
             children = _together([children, lit])
     else:
         children = _bent(edit, field, rows, points, A, proceed)
-    return _parted(field, children, room) if len(children.parent) else None
+    return _parted(splats, children, room) if len(children.parent) else None
 
 
 def _axes(field: SplatField, rows: NDArray[np.int64]) -> Array:
@@ -423,10 +424,10 @@ def _crossing(
 
 
 def _parted(
-    field: SplatField, children: _Children, room: float
-) -> tuple[Mask, SplatField, NDArray[np.int64]] | None:
+    splats: SplatSet, children: _Children, room: float
+) -> tuple[Mask, SplatSet, NDArray[np.int64]] | None:
     """(which splats stay whole, the others' children, whose); if too many, of the most opaque parents."""
-    parents = np.unique(children.parent)
+    field, parents = splats.field, np.unique(children.parent)
     if len(children.parent) > room:
         order = np.argsort(-field.opacities[parents], kind="stable")
         fits = int(len(parents) * max(0.0, room) / len(children.parent))
@@ -456,19 +457,4 @@ def _parted(
         bounds=field.bounds,
         unbounded=field.unbounded,
     )
-    return stay, descend(parted, field, n), n
-
-
-def _taken(field: SplatField, rows: Mask) -> SplatField:
-    return descend(field.take(rows), field, rows)
-
-
-def _joined(parts: list[SplatField]) -> SplatField:
-    names = ("means", "log_scales", "quaternions", "opacities", "sh")
-    means, log_scales, quaternions, opacities, sh = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in names
-    )
-    joined = dataclasses.replace(
-        parts[0], means=means, log_scales=log_scales, quaternions=quaternions, opacities=opacities, sh=sh
-    )
-    return descend_from_all(joined, parts)
+    return stay, splats.inherit_origins(parted, n), n

@@ -15,6 +15,7 @@ from cagefield.pages.page_file import LEVEL, QUICK_LEVEL
 from cagefield.pages.page_splat_edits import encode_page_splat_edits
 from cagefield.pages.page_splats import encode_page_splats
 from cagefield.rendering.splats.raster_splats import changed_splats
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.splats.splitting import split_of
 from cagefield.rendering.voxels.occupancy import Occupancy
 from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
@@ -56,8 +57,8 @@ class PageFiles:
         edits = self._renderers.edits(task.shown.edits)
         self._for_page.keep_only(self._renderers.known_edits)
         self._own.keep_only([*self._for_page.values()])
-        field = self._renderers.scene.field
-        if isinstance(field, SplatField):
+        field = self._renderers.scene.rendered_field
+        if isinstance(field, SplatSet):
             return self._splat_edits(field, edits, task, stop)
         drawn = [self._prepared(edit) for edit in edits]
         same = all(one is other for one, other in zip(edits, drawn, strict=True))
@@ -83,7 +84,7 @@ class PageFiles:
         return EditsDone(task.number, found.data, found.keys, refined.refinement, *spent)
 
     def _splat_edits(
-        self, field: SplatField, shown: Sequence[Edit], task: PageEditsTask, stop: Stop
+        self, splats: SplatSet, shown: Sequence[Edit], task: PageEditsTask, stop: Stop
     ) -> EditsDone | Stopped:
         """All that edits change of splats, whatever the page has; none is split while something moves.
 
@@ -97,17 +98,17 @@ class PageFiles:
             edits = patcher.prepare(shown, stage=STAGES[task.refinement], proceed=proceed)
             is_coarse = task.refinement.is_coarse
             changed = changed_splats(
-                field,
+                splats,
                 edits,
                 preserve_opacity=task.shown.preserve_opacity,
                 coarse=is_coarse,
-                split=None if is_coarse else split_of(field, edits, proceed=proceed),
+                split=None if is_coarse else split_of(splats, edits, proceed=proceed),
                 proceed=proceed,
             )
         except GivenUpError:
             return Stopped(task.number)
         mapped = time.perf_counter()
-        content = encode_page_splat_edits(field, changed)
+        content = encode_page_splat_edits(splats.field, changed)
         attained = attained_refinement(task.refinement, shown, patcher)
         return EditsDone(task.number, content, (), attained, mapped - began, time.perf_counter() - mapped)
 

@@ -57,7 +57,7 @@ class RendererCache:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.plain = renderer_of(scene.field)
+        self.plain = renderer_of(scene.rendered_field)
         self._is_sampled = isinstance(scene.field, VoxelField)
         """Whether rays are sampled, and samples mapped: lattices and steps are for those alone."""
         self._edits: list[Edit] = []

@@ -10,7 +10,9 @@ import numpy as np
 from cagefield.completion.patcher import PatchStage
 from cagefield.edits import Continuous, EditMap
 from cagefield.fields.splat_field import SplatField
+from cagefield.fields.voxel_field import VoxelField
 from cagefield.rendering.splats.raster_splats import deformed_splats
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.server.editor.cage_placement import probes
 from cagefield.server.render_worker.cancellation import GivenUpError, cancellation_check
 from cagefield.server.render_worker.encoding import picture_of, png
@@ -142,7 +144,7 @@ class TaskHandlers:
 
     def _fit(self, task: FitTask) -> list[bool]:
         """Which of the cage's `probes` are dense."""
-        field = self._renderers.scene.field
+        field: VoxelField | SplatField | SplatSet = self._renderers.scene.rendered_field
         edits: EditMap
         if task.source is not None:
             content = self._renderers.scene.sources.read(task.source)
@@ -152,7 +154,7 @@ class TaskHandlers:
             edits = self._renderers.scene.patcher.prepare(
                 below, stage=PatchStage.CACHED, preserve_opacity=False
             )
-        if isinstance(field, SplatField):
+        if not isinstance(field, VoxelField):
             return dense_cells(task.cage, deformed_splats(field, edits)).tolist()
         from cagefield.edits.kernel_map import KernelMap
         from cagefield.rendering.edited_field import EditedField
