@@ -21,11 +21,11 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.edits import Continuous, Edit, PreparedEdit, PreparedStack
 from cagefield.edits.device import packing
 from cagefield.edits.device_stack import DeviceStack
@@ -94,8 +94,7 @@ def encode_changed_edits(
     arrays: dict[str, NDArray[Any]] = {}
     for step in steps:
         if isinstance(step.edit, Continuous):
-            nodes = step.edit.lattice_nodes
-            key = _lattice_key(step.edit, nodes)
+            nodes, key = step.edit.lattice_nodes, _lattice_key(step.edit)
             if key not in has and all(key != before["key"] for before in lattices):
                 arrays[f"lattice.{len(lattices)}"] = byte_planes(nodes.reshape(-1).astype(np.float16))
             lattices.append({"key": key, "nodes": len(nodes)})
@@ -166,14 +165,10 @@ def _occupancy(
     return header, codes
 
 
-_keys: WeakKeyDictionary[Edit, str] = WeakKeyDictionary()
-
-
-def _lattice_key(edit: Edit, nodes: Float32) -> str:
-    """The key of an edit's lattice; worked out once in the edit's life."""
-    if edit not in _keys:
-        _keys[edit] = digest(nodes)
-    return _keys[edit]
+@memoized_weakly
+def _lattice_key(edit: Continuous) -> str:
+    """Key of an edit's lattice: the digest of its nodes."""
+    return digest(edit.lattice_nodes)
 
 
 def _rows(edit: Edit, row: NDArray[np.float32], first_node: int) -> Float32:
