@@ -27,7 +27,7 @@ LIMITS = {
     "functions called of": 0,
     "constant names with several values": 15,
     "definitions in British spelling": 14,
-    "parameters of the longest signature": 25,
+    "parameters of the longest signature": 12,
 }
 
 

@@ -99,6 +99,7 @@ class VoxelRenderer:
         from cagefield.edits.device_stack import DeviceStack
         from cagefield.rendering.voxels.device_grid import for_kernels, occupancy_args
         from cagefield.rendering.voxels.drag_occupancy import Chain, replaced
+        from cagefield.rendering.voxels.kernels.march import EmptySpaceArgs
         from cagefield.rendering.voxels.occupancy_deformed import Known, deform
 
         stack = DeviceStack.from_stack(self.edits)
@@ -115,9 +116,12 @@ class VoxelRenderer:
                 link = self._chain.link(self.edits.steps[place])
         self._coarse = coarse
         self.occupancy = deform(self._canonical, self.grid, stack, jumps, known, coarse, proceed, link)
-        self._bricks = occupancy_args(self.occupancy, for_kernels(self.occupancy.codes))
         self._stack = stack
-        self._boxes = for_kernels(stack.boxes.astype(np.float32))
+        self._space = EmptySpaceArgs(
+            occupancy_args(self.occupancy, for_kernels(self.occupancy.codes)),
+            self._canonical_bricks,
+            for_kernels(stack.boxes.astype(np.float32)),
+        )
 
     def render(
         self,
@@ -166,10 +170,8 @@ class VoxelRenderer:
                 march.TileArgs(ints((x, y)), ints((width, height)), row, few),
                 how,
                 grid,
-                self._bricks,
-                self._canonical_bricks,
+                self._space,
                 self._stack.args,
-                self._boxes,
                 field.sh.shape[1],
                 field.contracted,
                 self._stack.n_edits > 0,

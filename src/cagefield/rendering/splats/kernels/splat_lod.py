@@ -136,27 +136,14 @@ def rows_of(chosen, order, size, out):
 
 
 @njit(parallel=True, **FAST)
-def merge(
-    means,
-    covariances,
-    opacities,
-    sh,
-    rotations,
-    order,
-    size,
-    masses,
-    out_means,
-    out_covariances,
-    out_sh,
-    out_rotations,
-    out_masses,
-    out_apart,
-):
-    """Write the representatives of each `size` consecutive splats of `order`.
+def merge(splats, masses, order, size, merged):
+    """Write the `MergedSplats` of each `size` consecutive elements of `order` of the `SplatArgs`.
 
     masses [N,2] of the merged elements: sum of w over its own area, sum of Li2(o), or no rows for splats.
-    out_apart [M]: rms distance of the means from the representative's.
+    apart [M]: rms distance of the means from the representative's.
     """
+    means, covariances, opacities, sh, rotations = splats
+    out_means, out_covariances, out_sh, out_rotations, out_masses, out_apart = merged
     terms = sh.shape[1]
     turned = rotations.shape[0] > 0
     for g in prange(out_means.shape[0]):
