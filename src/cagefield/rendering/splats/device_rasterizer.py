@@ -1,4 +1,4 @@
-"""Splat rasterizer on Quadrants' device: the host side of `kernels.splat_device`, for GPUs.
+"""Splat rasterizer on Quadrants' device: the host side of `kernels.device_rasterizer`, for GPUs.
 
 The layout of images equals that of `rasterizer` on the CPU. Sorting is done on the host: depths, then
 the tiles that each splat touches, both stable.
@@ -52,7 +52,7 @@ class SplatArrays:
 
 @dataclass(frozen=True, eq=False)
 class DeviceProjection:
-    """As `splat_rasterizer.Projection`, with packed splats, `ids` and `starts` on the device."""
+    """As `rasterizer.Projection`, with packed splats, `ids` and `starts` on the device."""
 
     packed: Any
     ids: Any
@@ -100,7 +100,7 @@ class DeviceProjection:
 def project(
     arrays: SplatArrays, camera: Camera, *, near: float, region: Region | None = None
 ) -> DeviceProjection:
-    """The splats as `camera` sees them; see `splat_rasterizer.project`."""
+    """The splats as `camera` sees them; see `rasterizer.project`."""
     x, y, width, height = region or (0, 0, camera.width, camera.height)
     lens = intrinsics(camera)
     count = len(arrays.splats)

@@ -34,7 +34,7 @@ _NO_NORMALS: Float32 = np.empty((0, 3), np.float32)
 
 @dataclass(frozen=True, eq=False)
 class DiscProjection:
-    """The pairs (tile, disc) of one picture, near to far within each tile; see `splat_tiles.bin_pairs`.
+    """The pairs (tile, disc) of one picture, near to far within each tile; see `tile_binning.bin_pairs`.
 
     `camera` sees the picture, of which `region` is projected.
     """
@@ -100,7 +100,7 @@ def project_discs(
     normals: Float32 | None = None,
     buffers: Buffers | None = None,
 ) -> DiscProjection:
-    """The discs as `camera` sees them; as `splat_rasterizer.project`.
+    """The discs as `camera` sees them; as `rasterizer.project`.
 
     Raises:
         CagefieldError: splats without tangents.

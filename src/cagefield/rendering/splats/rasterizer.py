@@ -119,7 +119,7 @@ class Projection:
         veil: float = 0.0,
         weights: Float32 | None = None,
     ) -> Float32:
-        """Sums [pairs, SUMS] (see `splat_blending`) for dL/d(picture) `slopes` [tiles,3,AREA].
+        """Sums [pairs, SUMS] (see `blending`) for dL/d(picture) `slopes` [tiles,3,AREA].
 
         `colour` [tiles,3,AREA] is the picture over its background, whose part in the gradient is included.
         `empty` [2,h,w] are distances along the picture's rays, at its size or smaller, up to which there is
@@ -256,7 +256,7 @@ def pairs_of_tiles(
 ]:
     """(order, starts, ids, firsts, slots, pairs): the splats or discs `shown`, near to far in each tile.
 
-    `keys` [N] sort them, `tiles` [N,4] are their boxes of tiles; see `splat_tiles.bin_pairs` for the results.
+    `keys` [N] sort them, `tiles` [N,4] are their boxes of tiles; results as `tile_binning.bin_pairs`.
     """
     every = shown.astype(np.int64)
     order = every[np.argsort(keys[every])]

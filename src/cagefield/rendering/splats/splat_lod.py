@@ -100,7 +100,7 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Clusters:
-    """Clusters of living splats: order [N] of the splats, boxes [clusters,BOX].
+    """Clusters of living splats: order [N] of the splats, boxes [clusters,CLUSTER_FLOATS].
 
     The splats are a weak reference: remembered clusters do not keep them alive.
     """

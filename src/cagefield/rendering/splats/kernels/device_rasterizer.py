@@ -227,7 +227,7 @@ def project(
 
 @qd.func
 def overlaps(packed: qd.template(), i: qd.i32, column: qd.i32, line: qd.i32):
-    """1 where alpha exceeds ALPHA_MIN at some point of a tile; see `splat_tiles.overlaps`."""
+    """1 where alpha exceeds ALPHA_MIN at some point of a tile; see `tile_binning.overlaps`."""
     row = PACKED * i
     x0 = column * TILE_PX - packed[row]
     y0 = line * TILE_PX - packed[row + 1]
@@ -288,7 +288,7 @@ def list_tiles(
 def blend(
     packed: F32, ids: I32, starts: I32, count: qd.i32, across: qd.i32, out: F32, channels: qd.template()
 ):
-    """Blends all tiles into out [tiles, channels, AREA]; see `splat_blending.blend`."""
+    """Blends all tiles into out [tiles, channels, AREA]; see `blending.blend`."""
     qd.loop_config(block_dim=AREA)
     for n in range(count * AREA):
         t = n // AREA
@@ -339,7 +339,7 @@ def opacity_before(
     out: F32,
     number: qd.i32,
 ):
-    """Opacity gathered before distances along the rays of pixels; see `splat_blending.opacity_before`."""
+    """Opacity gathered before distances along the rays of pixels; see `blending.opacity_before`."""
     for n in range(number):
         x = pixels[2 * n] - 0.5
         y = pixels[2 * n + 1] - 0.5

@@ -7,7 +7,7 @@ dilogarithm: the integral of -log(1 - o exp(-r^2 / 2)) over the plane.
 
 A group's representative keeps the moments of its splats, weighted by w = Li2(o) A: mean, covariance (with
 the spread of the means), color, and its optical depth, as if all projected areas a were in the proportion
-of the areas A. Its opacity follows from the depth per screen area: see `splat_projection.project`.
+of the areas A. Its opacity follows from the depth per screen area: see `projection.project`.
 
 The oracle is in the tests: sums over the groups in float64, and every splat projected.
 
