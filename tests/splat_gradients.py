@@ -11,13 +11,19 @@ from cagefield.cameras.camera import Camera
 from cagefield.rendering.splats import reference_rasterizer as reference
 from cagefield.rendering.splats.rasterizer import (
     COLOR,
+    camera_args,
     intrinsics,
     kernels,
     project,
     tiled,
-    world_to_camera,
 )
-from cagefield.training.splats.kernels.splat_backward import CURVATURE_FLOATS, GRADIENT_FLOATS, backpropagate
+from cagefield.training.splats.kernels.splat_backward import (
+    CURVATURE_FLOATS,
+    GRADIENT_FLOATS,
+    PairArgs,
+    ParameterArgs,
+    backpropagate,
+)
 from splat_views import NEAR, single, splats_of
 
 Values = dict[str, NDArray]
@@ -37,28 +43,22 @@ def analytic(
     tiles, stops = seen.blend(COLOR)
     color = np.ascontiguousarray(tiles[:, 1:4] + tiles[:, :1] * background[:, None].astype(np.float32))
     slopes = color - tiled(target.astype(np.float32))
-    lens = intrinsics(view)
     gradients = np.zeros((len(splats), GRADIENT_FLOATS), np.float32)
     curvatures = np.zeros((len(splats), CURVATURE_FLOATS), np.float32)
     sums = seen.gradients(color, slopes, stops)
     with kernels():
         backpropagate(
-            seen.order,
-            seen.firsts,
-            seen.slots,
-            sums,
+            PairArgs(seen.order, seen.firsts, seen.slots, sums),
             seen.packed,
-            splats.means,
-            values["log_scales"].astype(np.float32),
-            values["quaternions"].astype(np.float32),
+            ParameterArgs(
+                splats.means,
+                values["log_scales"].astype(np.float32),
+                values["quaternions"].astype(np.float32),
+                values["logits"].astype(np.float32),
+                splats.sh,
+            ),
             splats.opacities,
-            splats.sh,
-            world_to_camera(view),
-            view.origin,
-            lens.focal,
-            lens.limits,
-            lens.model,
-            lens.coefficients,
+            camera_args(view, NEAR),
             antialiased,
             True,
             gradients,

@@ -25,9 +25,9 @@ LIMITS = {
     "share of sentences with what": 0.0016,
     "sentences that begin with what, that, those, the same": 7,
     "functions called of": 0,
-    "constant names with several values": 15,
+    "constant names with several values": 14,
     "definitions in British spelling": 14,
-    "parameters of the longest signature": 25,
+    "parameters of the longest signature": 12,
 }
 
 

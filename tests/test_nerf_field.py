@@ -107,7 +107,7 @@ def test_many_directions_share_one_trunk() -> None:
     field = small_field()
     p = np.random.default_rng(1).uniform(-1.5, 1.5, (9, 3)).astype(np.float32)
     d = directions(9 * 5).reshape(9, 5, 3)
-    sigma, rgb = field.seen_along(p, d)
+    sigma, rgb = field.evaluate_directions(p, d)
     for k in range(5):
         expected = field(p, d[:, k])
         np.testing.assert_allclose(sigma, expected[0], rtol=1e-5, atol=1e-6)
@@ -126,7 +126,7 @@ def test_a_bounded_field_is_empty_outside_its_bounds_and_the_same_within() -> No
     np.testing.assert_allclose(found, np.where(inside, sigma, 0.0), atol=1e-4)
     np.testing.assert_allclose(color[inside], rgb[inside], atol=1e-5)
     np.testing.assert_allclose(
-        bounded.seen_along(p, np.stack([d, -d], axis=1))[0], np.where(inside, sigma, 0.0), atol=1e-4
+        bounded.evaluate_directions(p, np.stack([d, -d], axis=1))[0], np.where(inside, sigma, 0.0), atol=1e-4
     )
     raw = bounded.signed_density(p, d)
     assert raw[~inside].max() <= 0.0 and np.any(raw[inside] > 1.0)

@@ -218,7 +218,7 @@ def test_degrees_of_colour_that_differ(folder: Path) -> None:
 
 def test_surroundings_get_a_shadow(tmp_path: Path) -> None:
     """As of a copy: the floor beside the thing is darker with relight, and nothing else is."""
-    from test_patches import FLOOR, cameras, room
+    from test_completion import FLOOR, cameras, room
 
     Scene(room(True), cameras={"train": cameras()}).save(tmp_path / "box")
     scene = Scene(room(True), cameras={"train": cameras()}, folder=tmp_path / "room")

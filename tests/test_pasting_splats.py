@@ -30,7 +30,7 @@ from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.scene.scene import Scene
 from splat_rooms import LIGHT, cage, room
 from splat_scenes import random_splats, splat_scene
-from test_splat_patches import seen
+from test_completion_splats import seen
 
 BY = (3.2, 0.4, -0.2)
 CAMERA = Camera.look_at((1.6, -8.0, 2.0), (1.6, 0.0, 0.0), width=96, height=64, fov_x=0.8)

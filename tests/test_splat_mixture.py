@@ -70,7 +70,7 @@ def test_many_points_at_once_are_the_same_as_few() -> None:
     few = field(points[rows], along[rows, 1])
     np.testing.assert_array_equal(sigma[rows], few[0])
     np.testing.assert_array_equal(rgb[rows], few[1])
-    mean, seen = field.seen_along(points, along)
+    mean, seen = field.evaluate_directions(points, along)
     np.testing.assert_array_equal(seen[:, 1], rgb)
     np.testing.assert_allclose(mean, 0.5 * (sigma + field(points, along[:, 0])[0]), rtol=1e-6)
 

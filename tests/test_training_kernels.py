@@ -17,7 +17,7 @@ from cagefield.rendering.voxels.device_grid import to_device  # noqa: E402
 from cagefield.rendering.voxels.kernels.grid import ivec3  # noqa: E402
 from cagefield.training.voxels.grid_state import GridState, cell_sizes  # noqa: E402
 from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS  # noqa: E402
-from cagefield.training.voxels.kernels.gauss_newton_voxels import gauss_newton, laplacian  # noqa: E402
+from cagefield.training.voxels.kernels.gauss_newton_voxels import StepArgs, gauss_newton, laplacian  # noqa: E402
 from cagefield.training.voxels.kernels.ray_batches import PatchArgs  # noqa: E402
 from cagefield.training.voxels.kernels.training_march import (  # noqa: E402
     MAX_SAMPLES,
@@ -199,12 +199,7 @@ def test_gauss_newton_step_is_gradient_over_damped_curvature(tmp_path):
         grid.record,
         grid.workers,
         grid.slots,
-        0.9,
-        0.5,
-        0.25,
-        0.3,
-        0.01,
-        0.05,
+        StepArgs(0.9, 0.5, 0.25, 0.3, 0.01, 0.05),
         grid.terms,
     )
     density, sh, running, weight = grid.arrays()

@@ -16,16 +16,16 @@ from cagefield.edits.device.kernels.device_stack import map_samples
 from cagefield.edits.device.kernels.edit_maps import EditArgs
 from cagefield.edits.device.packing import (
     ALONE,
-    BOX,
+    CHANGED_BOX,
     FIRST,
     FLOW,
     IMAGE,
     OFFSET,
-    PART,
+    PART_PLACE,
     RECORD,
     RECORDS,
     RESOLUTION,
-    UNDER,
+    UNDER_PLACE,
     WIDTH,
     pack_warp,
     widened,
@@ -76,7 +76,7 @@ class DeviceStack:
             nodes = lattices[0] if len(lattices) == 1 else _pool.join(lattices)
         places = iter(stack.places)
         for number, step in enumerate(steps):
-            for column, layer in ((UNDER, step.under), (PART, step.part)):
+            for column, layer in ((UNDER_PLACE, step.under), (PART_PLACE, step.part)):
                 if layer is not None:
                     params[number, column] = next(places)
         for number in range(len(steps)):
@@ -149,12 +149,14 @@ def _flow_table(edit: Continuous) -> NDArray[np.float32]:
 
 def _meets(others: NDArray[np.float32], row: NDArray[np.float32]) -> bool:
     """True if the box of another row meets that of `row`, or that of the part of the field that V shows."""
-    boxes = [(row[BOX : BOX + 3], row[BOX + 3 : BOX + 6])]
-    if row[FIRST] == 0 and row[PART] == 0:
+    boxes = [(row[CHANGED_BOX : CHANGED_BOX + 3], row[CHANGED_BOX + 3 : CHANGED_BOX + 6])]
+    if row[FIRST] == 0 and row[PART_PLACE] == 0:
         image = row[RECORDS + IMAGE : RECORDS + RECORD].reshape(8, 3)
         reach = np.abs(image[1:]).sum(axis=0)
         boxes.append((image[0] - reach, image[0] + reach))
     meets = [
-        (others[:, BOX : BOX + 3] <= high) & (others[:, BOX + 3 : BOX + 6] >= low) for low, high in boxes
+        (others[:, CHANGED_BOX : CHANGED_BOX + 3] <= high)
+        & (others[:, CHANGED_BOX + 3 : CHANGED_BOX + 6] >= low)
+        for low, high in boxes
     ]
     return bool(np.any([each.all(axis=1) for each in meets]))

@@ -328,9 +328,9 @@ def _gradient(sigma: Float32, vertices: AnyArray) -> Float32:
 
 def _evaluate_colors(field: Field, positions: Float32, directions: Float32) -> Float32:
     """rgb [N,K,3] at positions [N,3] along directions [N,K,3]."""
-    seen_along = getattr(field, "seen_along", None)
-    if seen_along is not None:
-        return np.asarray(seen_along(positions, directions)[1], np.float32)
+    evaluate_directions = getattr(field, "evaluate_directions", None)
+    if evaluate_directions is not None:
+        return np.asarray(evaluate_directions(positions, directions)[1], np.float32)
     n, views, _ = directions.shape
     return field(np.repeat(positions, views, axis=0), directions.reshape(-1, 3))[1].reshape(n, views, 3)
 

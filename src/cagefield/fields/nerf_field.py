@@ -107,7 +107,7 @@ class NerfField:
         """Density [N] per world unit before its ReLU: negative where space is empty, 0 at surfaces."""
         return self.torch.numpy_signed(positions, viewdirs)
 
-    def seen_along(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:
+    def evaluate_directions(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:
         """(sigma [N], rgb [N,K,3]) at positions [N,3] along K directions each, viewdirs [N,K,3].
 
         The trunk is evaluated once per position; sigma, which depends on the direction with `ndc`, is the

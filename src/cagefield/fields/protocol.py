@@ -30,8 +30,8 @@ class Field(Protocol):
     `bounds`, for baking).
 
     Optional methods for baking: `signed_density(positions, viewdirs)` [N], negative in empty space, which
-    gives sharper surfaces than sigma; and `seen_along(positions [N,3], viewdirs [N,K,3])`, the sigma [N] and
-    rgb [N,K,3] of K directions at once, for fields where that is cheaper than K calls.
+    gives sharper surfaces than sigma; and `evaluate_directions(positions [N,3], viewdirs [N,K,3])`, the
+    sigma [N] and rgb [N,K,3] of K directions at once, for fields where that is cheaper than K calls.
     """
 
     @property

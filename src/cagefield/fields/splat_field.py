@@ -195,7 +195,7 @@ class SplatField:
         sigma, rgb = self.mixture.evaluate(np.asarray(positions), np.asarray(viewdirs)[:, None])
         return sigma[:, 0], np.clip(rgb[:, 0], 0.0, 1.0)
 
-    def seen_along(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:
+    def evaluate_directions(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:
         """(sigma [N], rgb [N,K,3]) at positions [N,3] along unit viewdirs [N,K,3]; sigma is the mean."""
         sigma, rgb = self.mixture.evaluate(np.asarray(positions), np.asarray(viewdirs))
         return sigma.mean(axis=1), np.clip(rgb, 0.0, 1.0)

@@ -23,7 +23,7 @@ MAX_TEXT_BYTES = 32 << 20
 FileState: TypeAlias = tuple[int, int] | None
 """When a file was written, ns, and its bytes; None where there is none."""
 
-_PART = 1 << 16
+_MIN_READ_BYTES = 1 << 16
 """Bytes that are asked for at a time, if the file says less: a buffer for all of them is taken before."""
 
 
@@ -58,7 +58,7 @@ def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
 
 def read_bytes(path: str | os.PathLike[str], most: int = MAX_TEXT_BYTES) -> bytes:
     """All bytes of a regular file, at most `most`. Raises as `open_regular`."""
-    part, content = max(_PART, check_regular(path, most) + 1), b""
+    part, content = max(_MIN_READ_BYTES, check_regular(path, most) + 1), b""
     with open_regular(path) as file:
         while more := file.read(part):
             content += more

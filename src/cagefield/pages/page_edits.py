@@ -180,7 +180,7 @@ def _rows(edit: Edit, row: NDArray[np.float32], first_node: int) -> Float32:
         raise EditError(f'edit "{edit.name}" has no lattice; a page draws shells from lattices (`for_pages`)')
     out = np.zeros((at.EDIT_ROWS, 4), np.float32)
     for first, column, count in (
-        (at.BOX_VECTOR, p.BOX, 2),
+        (at.BOX_VECTOR, p.CHANGED_BOX, 2),
         (at.LATTICE_VECTOR, p.TO_NODES, 1),
         (at.TO_NODES_VECTOR, p.TO_NODES + 3, 3),
         (at.NODE_BOX_VECTOR, p.NODE_BOX, 2),
@@ -192,9 +192,9 @@ def _rows(edit: Edit, row: NDArray[np.float32], first_node: int) -> Float32:
         (at.RESOLUTION_SCALAR, row[p.RESOLUTION]),
         (at.CONTINUOUS_SCALAR, row[p.CONTINUOUS]),
         (at.SIMPLE_SCALAR, row[p.SIMPLE]),
-        (at.UNDER_SCALAR, row[p.UNDER]),
+        (at.UNDER_SCALAR, row[p.UNDER_PLACE]),
         (at.NODE_SCALAR, first_node),
-        (at.PART_SCALAR, row[p.PART]),
+        (at.PART_SCALAR, row[p.PART_PLACE]),
     ):
         out[scalar, 3] = value
     for number in range(2):

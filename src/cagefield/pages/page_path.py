@@ -25,18 +25,18 @@ from numpy.typing import NDArray
 from cagefield.edits import EditMap, PreparedEdit
 from cagefield.edits.device.packing import (
     AFFINE,
-    BOX,
+    CHANGED_BOX,
     CONTINUOUS,
     FIRST,
     LAST,
     LOW,
     OFFSET,
-    PART,
+    PART_PLACE,
     RECORD,
     RECORDS,
     RESOLUTION,
     SIMPLE,
-    UNDER,
+    UNDER_PLACE,
 )
 from cagefield.edits.device_stack import DeviceStack
 from cagefield.fields.voxel_field import VoxelField
@@ -123,7 +123,7 @@ def encode_page_path(
     return pack(MAGIC, VERSION, header, arrays)
 
 
-_KINDS = [FIRST, LAST, CONTINUOUS, RESOLUTION, OFFSET, OFFSET + 1, SIMPLE, UNDER, PART]
+_KINDS = [FIRST, LAST, CONTINUOUS, RESOLUTION, OFFSET, OFFSET + 1, SIMPLE, UNDER_PLACE, PART_PLACE]
 _KINDS += [RECORDS + number * RECORD + AFFINE for number in range(2)]
 """Columns with the kind of an edit and the offsets of its layers."""
 
@@ -141,7 +141,7 @@ def mixed(one: PathState, other: PathState, share: float) -> DeviceStack:
     a, b = one.packed, other.packed
     params = (1.0 - share) * a.params + share * b.params
     # Boxes hold those of both.
-    for low in (BOX, *(RECORDS + number * RECORD + LOW for number in range(2))):
+    for low in (CHANGED_BOX, *(RECORDS + number * RECORD + LOW for number in range(2))):
         first, last = slice(low, low + 3), slice(low + 3, low + 6)
         params[:, first] = np.minimum(a.params[:, first], b.params[:, first])
         params[:, last] = np.maximum(a.params[:, last], b.params[:, last])

@@ -40,7 +40,7 @@ _HERE = files("cagefield.pages")
 STILLS_A_SECOND = 12.0
 """Of the camera path; between two of them the page goes straight."""
 
-PART = 3 << 16
+SCRIPT_PART_BYTES = 3 << 16
 """Bytes of a file in a script of a page: the browser reads on between two."""
 
 INDEX, SCRIPT = "index.html", "viewer.js"
@@ -114,7 +114,10 @@ class ScenePage:
         order += [("field", field[coarse:]), *((n, self.files[n]) for n in ("path",) if n in self.files)]
         scripts = [f"<script>{_viewer().decode()}</script>"]
         for name, data in order:
-            scripts += [_script(name, data[at : at + PART]) for at in range(0, len(data), PART)]
+            scripts += [
+                _script(name, data[at : at + SCRIPT_PART_BYTES])
+                for at in range(0, len(data), SCRIPT_PART_BYTES)
+            ]
         scripts += [_script(name, None) for name in self.files]
         entries = {name: {"bytes": len(data)} for name, data in self.files.items()}
         return self._html(ONE_FILE, entries, "\n".join(scripts))

@@ -24,7 +24,7 @@ from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.trilinear_shell import TrilinearShell
 
 # Columns.
-BOX = 0  # min, max of the deformed-space box outside which the edit changes nothing
+CHANGED_BOX = 0  # min, max of the deformed-space box outside which the edit changes nothing
 FIRST, LAST = 6, 7  # records that are tried, in order: first <= record < last
 CONTINUOUS = 8  # 1, or 0 for a discrete edit
 RESOLUTION = 9  # lattice nodes per axis; 0 evaluates the shell exactly, -1 (`FLOW`) a flow shell by its table
@@ -34,10 +34,12 @@ TO_NODES = 12  # origin [3] and matrix [3,3] of the lattice, node units
 NODE_BOX = 24  # min, max of the outer cage in node units, where it is a parallelepiped
 SIMPLE = 30  # 1 where phi is affine, V and V^o are parallelepipeds, and the shell is a lattice
 ALONE = 31  # 1 where no earlier edit reaches into the edit's box, or that of V^c where V shows the field
-UNDER = 32  # where samples of a discrete edit's region are read: `EMPTY`, or the place of a layer
-PART = 33  # where samples of V are read: 0, the field as the earlier edits make it, or the place of a layer
+UNDER_PLACE = 32  # where samples of a discrete edit's region are read: `EMPTY_PLACE`, or the place of a layer
+PART_PLACE = (
+    33  # where samples of V are read: 0, the field as the earlier edits make it, or the place of a layer
+)
 RECORDS = 34
-EMPTY = -1.0
+EMPTY_PLACE = -1.0  # a place without density
 AFFINE, MATRIX, CENTER, LOW, HIGH, BEND, IMAGE, RECORD = 0, 1, 10, 13, 16, 19, 31, 55
 WIDTH = RECORDS + 8 * RECORD
 
@@ -55,7 +57,9 @@ def pack_warp(warp: Warp, boxes: Array, lattice: int | None = None) -> NDArray[n
     Raises `EditError` for a map without a kernel.
     """
     row = np.zeros(WIDTH, dtype=np.float32)
-    row[BOX : BOX + 6] = widened(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])[None]).ravel()
+    row[CHANGED_BOX : CHANGED_BOX + 6] = widened(
+        np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])[None]
+    ).ravel()
     if isinstance(warp, DiscreteWarp):
         _pack_discrete(row, warp)
     elif isinstance(warp, ContinuousWarp):
@@ -67,7 +71,7 @@ def pack_warp(warp: Warp, boxes: Array, lattice: int | None = None) -> NDArray[n
 
 def _pack_discrete(row: NDArray[np.float32], warp: DiscreteWarp) -> None:
     row[FIRST], row[LAST] = int(warp.inner is None), 1 if warp.region is None else 2
-    row[UNDER] = EMPTY
+    row[UNDER_PLACE] = EMPTY_PLACE
     if warp.inner is not None:
         _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
     _record(row, 1, (warp.region or warp.source).corners)

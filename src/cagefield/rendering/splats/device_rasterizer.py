@@ -1,4 +1,4 @@
-"""Splat rasterizer on Quadrants' device: the host side of `kernels.splat_device`, for GPUs.
+"""Splat rasterizer on Quadrants' device: the host side of `kernels.device_rasterizer`, for GPUs.
 
 The layout of images equals that of `rasterizer` on the CPU. Sorting is done on the host: depths, then
 the tiles that each splat touches, both stable.
@@ -25,31 +25,34 @@ from cagefield.typing import Float32
 _FARTHEST = 1e9
 """Largest |(x/z, y/z)| that float32 squares."""
 
+_UNUSED: Float32 = np.zeros(1, np.float32)
+"""Kernel argument for arrays that are not read."""
+
 
 class SplatArrays:
-    """Splats on the device, kept from picture to picture; with their normals [N,3] where these were given."""
+    """Splats on the device, kept from image to image; with their normals [N,3] where these were given."""
 
     def __init__(self, splats: DeformedSplats, normals: Float32 | None = None) -> None:
         devices.start()
         self.splats = splats
-        self.count = len(splats)
         self.has_normals = normals is not None
-        self.means, self.covariances, self.opacities, self.sh, self.rotations, self.normals = (
-            to_device(np.zeros(1, np.float32) if values is None else values)
-            for values in (
-                splats.means,
-                splats.covariances,
-                splats.opacities,
-                splats.sh,
-                splats.rotations,
-                normals,
-            )
+        self.args = kernels.SplatArgs(
+            means=to_device(splats.means),
+            covariances=to_device(splats.covariances),
+            opacities=to_device(splats.opacities),
+            sh=to_device(splats.sh),
+            rotations=to_device(_UNUSED if splats.rotations is None else splats.rotations),
+            normals=to_device(_UNUSED if normals is None else normals),
+            count=len(splats),
+            antialiased=int(splats.antialiased),
+            turned=int(splats.rotations is not None),
+            with_normals=int(self.has_normals),
         )
 
 
 @dataclass(frozen=True, eq=False)
 class DeviceProjection:
-    """As `splat_rasterizer.Projection`, with packed splats, `ids` and `starts` on the device."""
+    """As `rasterizer.Projection`, with packed splats, `ids` and `starts` on the device."""
 
     packed: Any
     ids: Any
@@ -97,39 +100,30 @@ class DeviceProjection:
 def project(
     arrays: SplatArrays, camera: Camera, *, near: float, region: Region | None = None
 ) -> DeviceProjection:
-    """The splats as `camera` sees them; see `splat_rasterizer.project`."""
+    """The splats as `camera` sees them; see `rasterizer.project`."""
     x, y, width, height = region or (0, 0, camera.width, camera.height)
     lens = intrinsics(camera)
-    splats = arrays.splats
-    packed, keys = _empty(arrays.count * PACKED), _empty(arrays.count)
-    boxes = to_device(np.zeros(max(1, arrays.count) * 4, np.int32))
+    count = len(arrays.splats)
+    packed, keys = _empty(count * PACKED), _empty(count)
+    boxes = to_device(np.zeros(max(1, count) * 4, np.int32))
     origin = camera.origin.astype(np.float32).astype(np.float64)
     across, down = -(-width // TILE_PX), -(-height // TILE_PX)
     kernels.project(
-        arrays.means,
-        arrays.covariances,
-        arrays.opacities,
-        arrays.sh,
-        arrays.rotations,
-        arrays.normals,
-        arrays.count,
-        floats(world_to_camera(camera)),
-        floats(origin),
-        floats(camera.origin - origin),
-        floats(lens.focal),
-        floats(lens.center - (x, y)),
-        ints((width, height)),
-        floats(lens.limits),
-        floats(lens.coefficients),
-        min(lens.radius_limit, _FARTHEST),
-        near,
-        int(splats.antialiased),
-        int(splats.rotations is not None),
-        int(arrays.has_normals),
-        packed,
-        keys,
-        boxes,
-        splats.sh.shape[1],
+        arrays.args,
+        kernels.CameraArgs(
+            floats(world_to_camera(camera)),
+            floats(origin),
+            floats(camera.origin - origin),
+            floats(lens.focal),
+            floats(lens.center - (x, y)),
+            ints((width, height)),
+            floats(lens.limits),
+            floats(lens.coefficients),
+            min(lens.radius_limit, _FARTHEST),
+            near,
+        ),
+        kernels.ProjectionArgs(packed, keys, boxes),
+        arrays.splats.sh.shape[1],
         lens.model,
     )
     box = boxes.to_numpy().reshape(-1, 4)

@@ -16,16 +16,16 @@ from cagefield.cameras.camera import Camera
 from cagefield.errors import CagefieldError
 from cagefield.rendering.splats.kernels import discs
 from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE_PX
+from cagefield.rendering.splats.kernels.splat_args import DiscArgs, ProjectedSplats
 from cagefield.rendering.splats.raster_splats import NO_ROTATIONS, DeformedSplats
 from cagefield.rendering.splats.rasterizer import (
     DEPTH,
     Buffers,
     Region,
-    intrinsics,
+    camera_args,
     kernels,
     pairs_of_tiles,
     untiled,
-    world_to_camera,
 )
 from cagefield.typing import Float32
 
@@ -34,7 +34,7 @@ _NO_NORMALS: Float32 = np.empty((0, 3), np.float32)
 
 @dataclass(frozen=True, eq=False)
 class DiscProjection:
-    """The pairs (tile, disc) of one picture, near to far within each tile; see `splat_tiles.bin_pairs`.
+    """The pairs (tile, disc) of one picture, near to far within each tile; see `tile_binning.bin_pairs`.
 
     `camera` sees the picture, of which `region` is projected.
     """
@@ -100,7 +100,7 @@ def project_discs(
     normals: Float32 | None = None,
     buffers: Buffers | None = None,
 ) -> DiscProjection:
-    """The discs as `camera` sees them; as `splat_rasterizer.project`.
+    """The discs as `camera` sees them; as `rasterizer.project`.
 
     Raises:
         CagefieldError: splats without tangents.
@@ -109,32 +109,23 @@ def project_discs(
         raise CagefieldError("these splats are no discs: they have no tangents")
     buffers = buffers or Buffers()
     region = region or (0, 0, camera.width, camera.height)
-    x, y, width, height = region
-    lens, count = intrinsics(camera), len(splats)
+    width, height = region[2:]
+    count = len(splats)
     packed = buffers.take("packed", (count, PACKED), np.float32)
     keys = buffers.take("keys", (count,), np.float32)
     tiles = buffers.take("tiles", (count, 4), np.int32)
     with kernels():
         discs.project(
-            splats.means,
-            splats.tangents,
-            splats.opacities,
-            splats.sh,
-            NO_ROTATIONS if splats.rotations is None else splats.rotations,
+            DiscArgs(
+                splats.means,
+                splats.tangents,
+                splats.opacities,
+                splats.sh,
+                NO_ROTATIONS if splats.rotations is None else splats.rotations,
+            ),
             _NO_NORMALS if normals is None else np.ascontiguousarray(normals),
-            world_to_camera(camera),
-            camera.origin.astype(np.float64),
-            lens.focal,
-            lens.center - (x, y),
-            np.array((width, height)),
-            lens.limits,
-            lens.model,
-            lens.coefficients,
-            lens.radius_limit,
-            near,
-            packed,
-            keys,
-            tiles,
+            camera_args(camera, near, region),
+            ProjectedSplats(packed, keys, tiles),
         )
         shown = np.flatnonzero(tiles[:, 1] > tiles[:, 0])
         _, starts, ids, *_ = pairs_of_tiles(shown, keys, tiles, packed, True, width, height, buffers)

@@ -28,6 +28,7 @@ from cagefield.edits import EditMap
 from cagefield.fields.sh import scale_sh_colors
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.quaternions import rotation_matrices
+from cagefield.rendering.splats.kernels.splat_args import SplatArgs
 from cagefield.rendering.splats.splat_motion import MovedSplats, moved_splats
 from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.typing import Array, Float32, Mask
@@ -69,6 +70,11 @@ class DeformedSplats:
 
     def __len__(self) -> int:
         return len(self.means)
+
+    def kernel_args(self) -> SplatArgs:
+        """Arguments of the Numba kernels."""
+        rotations = NO_ROTATIONS if self.rotations is None else self.rotations
+        return SplatArgs(self.means, self.covariances, self.opacities, self.sh, rotations)
 
     @classmethod
     def of_field(cls, field: SplatField) -> DeformedSplats:

@@ -20,7 +20,8 @@ from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
 from cagefield.rendering.splats.kernels import blending, projection, tile_binning
 from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE_PX
-from cagefield.rendering.splats.raster_splats import NO_ROTATIONS, DeformedSplats
+from cagefield.rendering.splats.kernels.splat_args import CameraArgs, ProjectedSplats
+from cagefield.rendering.splats.raster_splats import DeformedSplats
 from cagefield.rendering.splats.splat_lod import Clusters, View
 from cagefield.typing import Float32
 
@@ -118,7 +119,7 @@ class Projection:
         veil: float = 0.0,
         weights: Float32 | None = None,
     ) -> Float32:
-        """Sums [pairs, SUMS] (see `splat_blending`) for dL/d(picture) `slopes` [tiles,3,AREA].
+        """Sums [pairs, SUMS] (see `blending`) for dL/d(picture) `slopes` [tiles,3,AREA].
 
         `colour` [tiles,3,AREA] is the picture over its background, whose part in the gradient is included.
         `empty` [2,h,w] are distances along the picture's rays, at its size or smaller, up to which there is
@@ -201,17 +202,16 @@ def project(
     """
     buffers = buffers or Buffers()
     x, y, width, height = region or (0, 0, camera.width, camera.height)
-    lens = intrinsics(camera)
-    W, origin = world_to_camera(camera), camera.origin.astype(np.float64)
+    view = camera_args(camera, near, (x, y, width, height))
     if clusters is None:
         sources = [_Source(splats, np.arange(len(splats), dtype=np.int32))]
     else:
-        view = View.from_region(
-            origin, W, lens.focal, lens.center - (x, y), (width, height), lens.limits, near,
-            pinhole=lens.model == projection.PINHOLE,
+        visible = View.from_region(
+            view.origin, view.world_to_camera, view.focal, view.center, (width, height), view.limits, near,
+            pinhole=view.model == projection.PINHOLE,
         )  # fmt: skip
         with kernels():
-            rows, *coarser = clusters.rows(view, detail)
+            rows, *coarser = clusters.rows(visible, detail)
             levels = clusters.levels if coarser else ()
         sources = [_Source(splats, rows)]
         sources += [
@@ -226,29 +226,14 @@ def project(
         for source in sources:
             end = begin + len(source.splats)
             projection.project(
-                source.splats.means,
-                source.splats.covariances,
-                source.splats.opacities,
-                source.splats.sh,
-                NO_ROTATIONS if source.splats.rotations is None else source.splats.rotations,
+                source.splats.kernel_args(),
                 _NO_NORMALS if normals is None else np.ascontiguousarray(normals),
                 _NO_MASSES if source.masses is None else source.masses,
                 _OPACITIES,
                 source.rows,
-                W,
-                origin,
-                lens.focal,
-                lens.center - (x, y),
-                np.array((width, height)),
-                lens.limits,
-                lens.model,
-                lens.coefficients,
-                lens.radius_limit,
-                near,
+                view,
                 splats.antialiased,
-                packed[begin:end],
-                keys[begin:end],
-                tiles[begin:end],
+                ProjectedSplats(packed[begin:end], keys[begin:end], tiles[begin:end]),
             )
             part = tiles[begin:end] if len(source.rows) == end - begin else tiles[begin:end][source.rows]
             shown.append(source.rows[part[:, 1] > part[:, 0]] + np.int32(begin))
@@ -271,7 +256,7 @@ def pairs_of_tiles(
 ]:
     """(order, starts, ids, firsts, slots, pairs): the splats or discs `shown`, near to far in each tile.
 
-    `keys` [N] sort them, `tiles` [N,4] are their boxes of tiles; see `splat_tiles.bin_pairs` for the results.
+    `keys` [N] sort them, `tiles` [N,4] are their boxes of tiles; results as `tile_binning.bin_pairs`.
     """
     every = shown.astype(np.int64)
     order = every[np.argsort(keys[every])]
@@ -288,6 +273,24 @@ def pairs_of_tiles(
 def world_to_camera(camera: Camera) -> NDArray[np.float64]:
     """The rotation [3,3] into camera axes x right, y down, z forward."""
     return np.ascontiguousarray(_TO_OPENCV @ camera.c2w[:3, :3].T)
+
+
+def camera_args(camera: Camera, near: float, region: Region | None = None) -> CameraArgs:
+    """Kernel arguments of a camera and the part (x, y, width, height) of its image."""
+    x, y, width, height = region or (0, 0, camera.width, camera.height)
+    lens = intrinsics(camera)
+    return CameraArgs(
+        world_to_camera(camera),
+        camera.origin.astype(np.float64),
+        lens.focal,
+        lens.center - (x, y),
+        np.array((width, height)),
+        lens.limits,
+        lens.model,
+        lens.coefficients,
+        lens.radius_limit,
+        near,
+    )
 
 
 def intrinsics(camera: Camera) -> Intrinsics:

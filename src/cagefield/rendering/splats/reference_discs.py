@@ -1,4 +1,4 @@
-"""Pictures of 2DGS' discs as their authors draw them, in float64: the oracle of `kernels.splat_discs`.
+"""Pictures of 2DGS' discs as their authors draw them, in float64: the oracle of `kernels.discs`.
 
 Notation: a disc has the mean p (camera axes, z forward) and the tangents a, b, each as long as its standard
 deviation. A pixel's ray meets its plane at p + u a + v b, and

@@ -1,6 +1,6 @@
 """Pictures of splats in float64, one splat after the other over the whole picture: the oracle of the kernels.
 
-Notation as in `kernels.splat_projection` and `kernels.splat_blending`: n = (x/z, y/z), D the lens's
+Notation as in `kernels.projection` and `kernels.blending`: n = (x/z, y/z), D the lens's
 derivative, M = J W, the projected covariance M C M^T + BLUR I, alpha = o exp(-d^T Q d / 2).
 
 Source: Zwicker et al., "EWA splatting" (2002), equations 24 to 34; Kerbl et al. (2023), equations 2 to 5.

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from cagefield.rendering.splats.kernels import splat_lod as kernels
 from cagefield.rendering.splats.kernels.projection import BLUR
-from cagefield.rendering.splats.raster_splats import NO_ROTATIONS, DeformedSplats
+from cagefield.rendering.splats.kernels.splat_args import MergedSplats
+from cagefield.rendering.splats.raster_splats import DeformedSplats
 from cagefield.typing import Float32
 
 CLUSTER = 256
@@ -99,7 +100,7 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Clusters:
-    """Clusters of living splats: order [N] of the splats, boxes [clusters,BOX].
+    """Clusters of living splats: order [N] of the splats, boxes [clusters,CLUSTER_FLOATS].
 
     The splats are a weak reference: remembered clusters do not keep them alive.
     """
@@ -190,10 +191,8 @@ def _merged(
     rotations = np.empty((count if turned else 0, 3, 3), np.float32)
     own, apart = np.empty((count, 2), np.float32), np.empty(count, np.float32)
     kernels.merge(
-        below.means, below.covariances, below.opacities, below.sh,
-        NO_ROTATIONS if below.rotations is None else below.rotations, order, size, masses,
-        means, covariances, sh, rotations, own, apart,
-    )  # fmt: skip
+        below.kernel_args(), masses, order, size, MergedSplats(means, covariances, sh, rotations, own, apart)
+    )
     spread = np.empty(clusters, np.float32)
     kernels.spreads(apart, per, spread)
     opacities = np.ones(count, np.float32)

@@ -44,10 +44,10 @@ class SplatRenderer:
 
     Renderers of one SplatSet share its cached results.
 
-    On a GPU the splats stay there between frames; see `splat_device`.
+    On a GPU the splats stay there between frames; see `device_rasterizer`.
 
     The splats are deformed once, when the renderer is made; frames cost the same with edits and without.
-    Pictures are within 50 dB and better of `splat_reference`. A fisheye lens shows directions less than
+    Pictures are within 50 dB and better of `reference_rasterizer`. A fisheye lens shows directions less than
     87 degrees off its axis.
     """
 
@@ -149,7 +149,7 @@ class SplatRenderer:
     ) -> Projection | DeviceProjection | DiscProjection:
         """The splats as the camera sees them; valid until this renderer projects again.
 
-        `detail` as `splat_rasterizer.project`, on CPUs alone. Discs are projected there in any case.
+        `detail` as `rasterizer.project`, on CPUs alone. Discs are projected there in any case.
         """
         if normals and self._normals is None:
             self._normals = flattest_axes(self.splats.covariances)

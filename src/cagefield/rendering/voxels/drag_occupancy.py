@@ -20,7 +20,7 @@ from cagefield.rendering.voxels.occupancy import Occupancy
 from cagefield.rendering.voxels.occupancy_deformed import deform
 
 
-def replaced(before: EditMap, after: EditMap) -> int | None:
+def replaced_place(before: EditMap, after: EditMap) -> int | None:
     """The place of the only active edit that differs, where another one's box meets its own; else None."""
     old, new = before.steps, after.steps
     if len(old) != len(new):
@@ -35,23 +35,26 @@ def replaced(before: EditMap, after: EditMap) -> int | None:
 
 
 @dataclass(frozen=True)
-class Link:
-    """An edit of a chain."""
+class DraggedEdit:
+    """The edit that a drag replaces, among the fixed edits."""
 
-    chain: Chain
+    fixed: FixedEdits
     stack: DeviceStack
 
     def near_bricks(
         self, grid: DeviceGrid, lower: NDArray[np.int64], count: NDArray[np.int64]
     ) -> NDArray[np.bool_]:
         """As `occupancy_continuous.near_bricks` of the whole stack, coarsely."""
-        starts = self.chain.starts(grid, lower, count)
-        return smooth.near_bricks(self.chain.below, grid, self.stack, lower, count, starts, coarse=True)
+        starts = self.fixed.starts(grid, lower, count)
+        return smooth.near_bricks(self.fixed.below, grid, self.stack, lower, count, starts, coarse=True)
 
 
 @dataclass(frozen=True)
-class Chain:
-    """The edits before and after a place, the occupancy below it, and corners taken to it from above."""
+class FixedEdits:
+    """Edits before and after the dragged one.
+
+    `below` is the occupancy under the earlier edits; `_starts` are corners mapped by the later ones.
+    """
 
     earlier: tuple[PreparedEdit, ...]
     later: tuple[PreparedEdit, ...]
@@ -59,21 +62,21 @@ class Chain:
     _starts: dict[tuple[int, ...], NDArray[np.float32]] = field(default_factory=dict)
 
     @classmethod
-    def build(cls, edits: EditMap, place: int, canonical: Occupancy, grid: DeviceGrid) -> Chain:
-        """The chain around a place among the active edits, none of which is discrete."""
+    def build(cls, edits: EditMap, place: int, canonical: Occupancy, grid: DeviceGrid) -> FixedEdits:
+        """Fixed edits around a place among the active edits, none of which is discrete."""
         active = edits.steps
         earlier = DeviceStack.from_stack(PreparedStack(active[:place]))
         below = deform(canonical, grid, earlier, jumps=False, coarse=True)
         return cls(active[:place], active[place + 1 :], below)
 
     def fits(self, edits: EditMap, place: int) -> bool:
-        """True where the other edits are those of the chain."""
+        """True where the edits at all other places are the fixed ones."""
         active = edits.steps
         return self.earlier == active[:place] and self.later == active[place + 1 :]
 
-    def link(self, edit: PreparedEdit) -> Link:
-        """The chain with this edit at its place."""
-        return Link(self, DeviceStack.from_stack(PreparedStack([edit])))
+    def with_dragged(self, edit: PreparedEdit) -> DraggedEdit:
+        """The dragged edit among the fixed ones."""
+        return DraggedEdit(self, DeviceStack.from_stack(PreparedStack([edit])))
 
     def starts(
         self, grid: DeviceGrid, lower: NDArray[np.int64], count: NDArray[np.int64]

@@ -38,7 +38,7 @@ class Known:
 
 
 class Shortcut(Protocol):
-    """A quicker way to a coarse pass, as `incremental_occupancy.Link` has for one edit of many."""
+    """A quicker way to a coarse pass, as `drag_occupancy.DraggedEdit` has for one edit of many."""
 
     def near_bricks(
         self, grid: DeviceGrid, lower: NDArray[np.int64], count: NDArray[np.int64]
@@ -54,13 +54,13 @@ def deform(
     known: Known | None = None,
     coarse: bool = False,
     proceed: Callable[[], None] | None = None,
-    link: Shortcut | None = None,
+    dragged: Shortcut | None = None,
 ) -> Occupancy:
     """The occupancy of a field seen through the edits. `jumps` says that an edit is discrete.
 
     Only the boxes outside of `known` are computed. `coarse` takes the first pass alone, by whole
-    bricks: a superset of the fine one, for a small part of the time; with a `link`, the stack
-    has the edit of the link in place of another one, and nothing else is worked out. `proceed` is called
+    bricks: a superset of the fine one, for a small part of the time; with a `dragged` edit, the stack
+    has this edit in place of another one, and nothing else is worked out. `proceed` is called
     between the passes, and may raise.
     """
     field, proceed = grid.field, proceed or nothing
@@ -90,7 +90,7 @@ def deform(
         proceed()
         begin, bricks = first + BRICK * low, high - low
         if coarse:
-            found: NDArray[Any] = FULL * _near_bricks(canonical, grid, stack, begin, bricks, jumps, link)
+            found: NDArray[Any] = FULL * _near_bricks(canonical, grid, stack, begin, bricks, jumps, dragged)
         else:
             found = _near_blocks(canonical, grid, stack, begin, bricks, new[region], jumps, proceed)
         np.copyto(held[region], found, where=new[region])
@@ -104,13 +104,13 @@ def _near_bricks(
     lower: NDArray[np.int64],
     count: NDArray[np.int64],
     jumps: bool,
-    link: Shortcut | None,
+    dragged: Shortcut | None,
 ) -> NDArray[np.uint8]:
     """1 for the bricks [count] from the grid coordinates `lower` on where a coarse pass finds something."""
     if jumps:
         near = jumping.near_bricks(canonical, grid, stack, lower, count)
-    elif link is not None:
-        near = link.near_bricks(grid, lower, count)
+    elif dragged is not None:
+        near = dragged.near_bricks(grid, lower, count)
     else:
         near = smooth.near_bricks(canonical, grid, stack, lower, count, coarse=True)
     return near.view(np.uint8)

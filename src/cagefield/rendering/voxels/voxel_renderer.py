@@ -18,7 +18,7 @@ from cagefield.images.render_result import Background, RenderResult
 
 if TYPE_CHECKING:
     from cagefield.rendering.voxels.device_grid import DeviceGrid
-    from cagefield.rendering.voxels.drag_occupancy import Chain
+    from cagefield.rendering.voxels.drag_occupancy import FixedEdits
     from cagefield.rendering.voxels.occupancy import Occupancy
 
 BAND = 4
@@ -64,7 +64,7 @@ class VoxelRenderer:
         self._pixels: dict[tuple[int, int], Any] = {}
         self._directions: dict[int, tuple[NDArray[np.float32], Any]] = {}
         self._coarse = False
-        self._chain: Chain | None = None
+        self._fixed_edits: FixedEdits | None = None
         self._pack_edits()
 
     def with_edits(
@@ -98,7 +98,8 @@ class VoxelRenderer:
         from cagefield.edits.device.packing import widened
         from cagefield.edits.device_stack import DeviceStack
         from cagefield.rendering.voxels.device_grid import for_kernels, occupancy_args
-        from cagefield.rendering.voxels.drag_occupancy import Chain, replaced
+        from cagefield.rendering.voxels.drag_occupancy import FixedEdits, replaced_place
+        from cagefield.rendering.voxels.kernels.march import EmptySpaceArgs
         from cagefield.rendering.voxels.occupancy_deformed import Known, deform
 
         stack = DeviceStack.from_stack(self.edits)
@@ -106,18 +107,21 @@ class VoxelRenderer:
         known = None
         if before is not None and jumps == _jumps(before.edits) and (coarse or not before._coarse):
             known = Known(before.occupancy, widened(self.edits.changed_boxes(before.edits)))
-        link = None
+        dragged = None
         if before is not None and coarse and not jumps:
-            place = replaced(before.edits, self.edits)
+            place = replaced_place(before.edits, self.edits)
             if place is not None:
-                if self._chain is None or not self._chain.fits(self.edits, place):
-                    self._chain = Chain.build(self.edits, place, self._canonical, self.grid)
-                link = self._chain.link(self.edits.steps[place])
+                if self._fixed_edits is None or not self._fixed_edits.fits(self.edits, place):
+                    self._fixed_edits = FixedEdits.build(self.edits, place, self._canonical, self.grid)
+                dragged = self._fixed_edits.with_dragged(self.edits.steps[place])
         self._coarse = coarse
-        self.occupancy = deform(self._canonical, self.grid, stack, jumps, known, coarse, proceed, link)
-        self._bricks = occupancy_args(self.occupancy, for_kernels(self.occupancy.codes))
+        self.occupancy = deform(self._canonical, self.grid, stack, jumps, known, coarse, proceed, dragged)
         self._stack = stack
-        self._boxes = for_kernels(stack.boxes.astype(np.float32))
+        self._space = EmptySpaceArgs(
+            occupancy_args(self.occupancy, for_kernels(self.occupancy.codes)),
+            self._canonical_bricks,
+            for_kernels(stack.boxes.astype(np.float32)),
+        )
 
     def render(
         self,
@@ -166,10 +170,8 @@ class VoxelRenderer:
                 march.TileArgs(ints((x, y)), ints((width, height)), row, few),
                 how,
                 grid,
-                self._bricks,
-                self._canonical_bricks,
+                self._space,
                 self._stack.args,
-                self._boxes,
                 field.sh.shape[1],
                 field.contracted,
                 self._stack.n_edits > 0,

@@ -22,11 +22,10 @@ from cagefield.rendering.splats.rasterizer import (
     COLOR,
     Buffers,
     Projection,
-    intrinsics,
+    camera_args,
     kernels,
     near_depth,
     project,
-    world_to_camera,
 )
 from cagefield.training.checkpoint import read_checkpoint, signature_options, write_checkpoint
 from cagefield.training.checkpoint_checks import (
@@ -46,8 +45,8 @@ from cagefield.training.splats.initialization import (
     initialize_splats,
     median_camera_distance,
 )
-from cagefield.training.splats.kernels.gauss_newton_splats import gauss_newton, residuals
-from cagefield.training.splats.kernels.splat_backward import backpropagate, build_covariances
+from cagefield.training.splats.kernels.gauss_newton_splats import StepArgs, gauss_newton, residuals
+from cagefield.training.splats.kernels.splat_backward import PairArgs, backpropagate, build_covariances
 from cagefield.training.splats.kernels.ssim import MOMENT_PLANES, WINDOW_PIXELS, add_ssim_gradient
 from cagefield.training.splats.pose_optimization import POSE_START_PROGRESS, PoseRefinement
 from cagefield.training.splats.robust_weights import ROBUST_START_PROGRESS, RobustWeights
@@ -176,7 +175,6 @@ class SplatRun:
         tile_sums = np.empty((projected.tiles, 7), np.float32)
         background = self._next_background()
         gain = self.gains[index]
-        lens = intrinsics(camera)
         rate = config.lr[0] * (config.lr[1] / config.lr[0]) ** done
         degree = max(n for n in range(config.sh_degree + 1) if done >= DEGREE_START_PROGRESS[n])
         weights = self._weights(index, level, projected.tiles)
@@ -193,25 +191,45 @@ class SplatRun:
                 color, slopes, stops, sums, self.free_distances[index], config.empty_space_penalty, weights
             )
             backpropagate(
-                projected.order, projected.firsts, projected.slots, sums, projected.packed, splats.means,
-                state.log_scales, state.quaternions, splats.opacities, splats.sh, world_to_camera(camera),
-                camera.origin, lens.focal, lens.limits, lens.model, lens.coefficients, config.antialiased,
-                False, state.gradients, state.curvatures,
-            )  # fmt: skip
+                PairArgs(projected.order, projected.firsts, projected.slots, sums),
+                projected.packed,
+                state.parameter_args(),
+                splats.opacities,
+                camera_args(camera, self._near),
+                config.antialiased,
+                False,
+                state.gradients,
+                state.curvatures,
+            )
             if config.refine_poses and done >= POSE_START_PROGRESS:
                 self.poses.step(index, camera.origin, state, projected.order, min(rate, 1.0))
             gauss_newton(
-                projected.order, state.gradients, state.curvatures, state.means, state.log_scales,
-                state.quaternions, state.logits, state.sh, camera.origin, state.momentum, state.running,
-                state.ticks, np.array(config.ema_decay), np.array([rate, rate, rate, rate, 0.5 * rate]),
-                np.array(config.damping), np.array([config.max_step, config.max_step]), (degree + 1) ** 2,
-                np.array([1e-5, 1e3]) * self._scale, -config.opacity_reg,
-            )  # fmt: skip
+                projected.order,
+                state.gradients,
+                state.curvatures,
+                state.parameter_args(),
+                camera.origin,
+                state.average_args(),
+                self._step_args(rate, degree),
+            )
         state.error[projected.order] += state.gradients[projected.order, 15]
         state.hits[projected.order] += 1
         self._update_gain(index, tile_sums)
         loss = float(tile_sums[:, 0].sum()) / max(3.0 * float(weights.sum()), 1.0)
         self.running_loss = loss if not self.running_loss > 0 else 0.98 * self.running_loss + 0.02 * loss
+
+    def _step_args(self, rate: float, degree: int) -> StepArgs:
+        """Rule of the Gauss-Newton step at a learning rate, with harmonics up to a degree."""
+        config = self._config
+        return StepArgs(
+            memory=np.array(config.ema_decay),
+            rates=np.array([rate, rate, rate, rate, 0.5 * rate]),
+            damping=np.array(config.damping),
+            caps=np.array([config.max_step, config.max_step]),
+            terms=(degree + 1) ** 2,
+            scale_range=np.array([1e-5, 1e3]) * self._scale,
+            pull=-config.opacity_reg,
+        )
 
     def _add_ssim_slopes(
         self,

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.fields.splat_field import SplatField
-from cagefield.training.splats.kernels.gauss_newton_splats import MOMENTUM_FLOATS, RUNNING_FLOATS
-from cagefield.training.splats.kernels.splat_backward import CURVATURE_FLOATS, GRADIENT_FLOATS
+from cagefield.training.splats.kernels.gauss_newton_splats import MOMENTUM_FLOATS, RUNNING_FLOATS, AverageArgs
+from cagefield.training.splats.kernels.splat_backward import CURVATURE_FLOATS, GRADIENT_FLOATS, ParameterArgs
 from cagefield.typing import Float32
 
 
@@ -58,6 +58,14 @@ class SplatState:
 
     def __len__(self) -> int:
         return len(self.means)
+
+    def parameter_args(self) -> ParameterArgs:
+        """Parameters as kernel arguments."""
+        return ParameterArgs(self.means, self.log_scales, self.quaternions, self.logits, self.sh)
+
+    def average_args(self) -> AverageArgs:
+        """Running means of gradient and curvature as kernel arguments."""
+        return AverageArgs(self.momentum, self.running, self.ticks)
 
     def take(self, rows: NDArray[np.int64]) -> None:
         """Keep the given rows, in this order; a row may occur several times."""

@@ -13,7 +13,7 @@ from cagefield.compute.devices import floats, ints
 from cagefield.compute.quadrants import qd
 from cagefield.training.voxels.exposure import Exposure
 from cagefield.training.voxels.grid_state import GridState
-from cagefield.training.voxels.kernels.gauss_newton_voxels import gauss_newton, laplacian
+from cagefield.training.voxels.kernels.gauss_newton_voxels import StepArgs, gauss_newton, laplacian
 from cagefield.training.voxels.kernels.ray_batches import PatchArgs
 from cagefield.training.voxels.kernels.training_march import (
     MAX_SAMPLES,
@@ -122,12 +122,14 @@ class BatchTrainer:
             grid.record,
             grid.workers,
             grid.slots,
-            config.curvature_decay,
-            rate,
-            rate,
-            config.max_step,
-            config.damping,
-            self._settings.view_dependence_reg,
+            StepArgs(
+                config.curvature_decay,
+                rate,
+                rate,
+                config.max_step,
+                config.damping,
+                self._settings.view_dependence_reg,
+            ),
             grid.terms,
         )
 

@@ -13,20 +13,20 @@ from cagefield.compute.quadrants import qd
 from cagefield.edits.device.kernels.hexahedron import image, in_box, locate, read3, times
 from cagefield.edits.device.kernels.lattice import first_node, interpolate, to_nodes
 from cagefield.edits.device.packing import (
-    BOX,
     CENTER,
+    CHANGED_BOX,
     CONTINUOUS,
     EDGE,
     FIRST,
     LAST,
     MATRIX,
     NODE_BOX,
-    PART,
+    PART_PLACE,
     RECORD,
     RECORDS,
     RESOLUTION,
     SIMPLE,
-    UNDER,
+    UNDER_PLACE,
 )
 from cagefield.warps.kernels.flow_shell import flow_sample
 
@@ -57,7 +57,7 @@ def map_sample(p: vec3, d: vec3, edits: EditArgs, flows: qd.template()):
     place = 0
     for n in range(edits.count):
         e = edits.count - 1 - n
-        if place == 0 and in_box(q, edits.params, e, BOX):
+        if place == 0 and in_box(q, edits.params, e, CHANGED_BOX):
             q, v, place = map_edit(q, v, edits.params, edits.lattice, e, flows)
     return q, v, place
 
@@ -111,7 +111,7 @@ def map_edit(
                 inside = error <= EDGE
                 if not continuous:
                     if inside:
-                        place = qd.cast(params[e, UNDER], qd.i32)
+                        place = qd.cast(params[e, UNDER_PLACE], qd.i32)
                 elif not inside:
                     break
                 elif resolution > 0:
@@ -127,7 +127,7 @@ def map_edit(
     elif hit >= 0:
         q, v = image(at, d, params, e, RECORDS + hit * RECORD)
         if hit == 0:
-            place = qd.cast(params[e, PART], qd.i32)
+            place = qd.cast(params[e, PART_PLACE], qd.i32)
     if qd.static(flows):
         if use_flow == 1:
             q, v = flow_sample(p, d, lattice, first_node(params, e))

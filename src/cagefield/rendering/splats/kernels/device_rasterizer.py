@@ -9,6 +9,8 @@ The oracle is `cagefield.rendering.splats.reference_rasterizer`.
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
+from dataclasses import dataclass
+
 from cagefield.compute.quadrants import qd
 from cagefield.rendering.splats.kernels import blending
 from cagefield.rendering.splats.kernels.projection import (
@@ -35,6 +37,53 @@ vec4 = qd.types.vector(4, qd.f32)
 vec6 = qd.types.vector(6, qd.f32)
 ivec2 = qd.types.vector(2, qd.i32)
 mat3 = qd.types.matrix(3, 3, qd.f32)
+
+
+@dataclass(frozen=True, eq=False)
+class SplatArgs:
+    """N = `count` splats as kernels take them, flattened; see `DeformedSplats`.
+
+    `rotations` is read where `turned` is 1, `normals` [N,3] where `with_normals` is 1.
+    """
+
+    means: F32
+    covariances: F32
+    opacities: F32
+    sh: F32
+    rotations: F32
+    normals: F32
+    count: qd.i32
+    antialiased: qd.i32
+    turned: qd.i32
+    with_normals: qd.i32
+
+
+@dataclass(frozen=True, eq=False)
+class CameraArgs:
+    """As `splat_args.CameraArgs`, without the lens's model.
+
+    W is the world-to-camera rotation. The camera is at origin + origin_rest, for float32 to hold it.
+    """
+
+    W: mat3
+    origin: vec3
+    origin_rest: vec3
+    focal: vec2
+    center: vec2
+    size: ivec2
+    limits: vec4
+    coefficients: vec6
+    radius_limit: qd.f32
+    near: qd.f32
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectionArgs:
+    """Output of a projection, flattened; see `splat_args.ProjectedSplats`."""
+
+    packed: F32
+    keys: F32
+    tiles: I32
 
 
 @qd.func
@@ -69,59 +118,45 @@ def distort(x: qd.f32, y: qd.f32, k: vec6, model: qd.template()):
 
 @qd.kernel(fastcache=True)
 def project(
-    means: F32,
-    covariances: F32,
-    opacities: F32,
-    sh: F32,
-    rotations: F32,
-    normals: F32,
-    count: qd.i32,
-    W: mat3,
-    origin: vec3,
-    origin_rest: vec3,
-    focal: vec2,
-    center: vec2,
-    size: ivec2,
-    limits: vec4,
-    coefficients: vec6,
-    radius_limit: qd.f32,
-    near: qd.f32,
-    antialiased: qd.i32,
-    turned: qd.i32,
-    with_normals: qd.i32,
-    packed: F32,
-    keys: F32,
-    tiles: I32,
-    K: qd.template(),
-    model: qd.template(),
+    splats: SplatArgs, camera: CameraArgs, out: ProjectionArgs, K: qd.template(), model: qd.template()
 ):
-    """As `splat_projection.project`; the camera is at origin + origin_rest, for float32 to hold it."""
-    across = (size.x + TILE_PX - 1) // TILE_PX
-    down = (size.y + TILE_PX - 1) // TILE_PX
+    """As `projection.project`, of all splats; K harmonics."""
+    across = (camera.size.x + TILE_PX - 1) // TILE_PX
+    down = (camera.size.y + TILE_PX - 1) // TILE_PX
     qd.loop_config(block_dim=128)
-    for i in range(count):
-        offset = vec3(means[3 * i], means[3 * i + 1], means[3 * i + 2]) - origin - origin_rest
-        p = W @ offset
+    for i in range(splats.count):
+        offset = (
+            vec3(splats.means[3 * i], splats.means[3 * i + 1], splats.means[3 * i + 2])
+            - camera.origin
+            - camera.origin_rest
+        )
+        p = camera.W @ offset
         z = p.z
-        keys[i] = z
+        out.keys[i] = z
         for j in range(4):
-            tiles[4 * i + j] = 0
-        if z >= near and opacities[i] > ALPHA_MIN:
+            out.tiles[4 * i + j] = 0
+        if z >= camera.near and splats.opacities[i] > ALPHA_MIN:
             n = vec2(p.x / z, p.y / z)
-            if n.x * n.x + n.y * n.y <= radius_limit * radius_limit:
-                nx = qd.min(limits[1], qd.max(limits[0], n.x))
-                ny = qd.min(limits[3], qd.max(limits[2], n.y))
-                lens = distort(nx, ny, coefficients, model)
-                px = (vec3(W[0, 0], W[0, 1], W[0, 2]) - nx * vec3(W[2, 0], W[2, 1], W[2, 2])) / z
-                py = (vec3(W[1, 0], W[1, 1], W[1, 2]) - ny * vec3(W[2, 0], W[2, 1], W[2, 2])) / z
-                M0 = focal.x * (lens[2] * px + lens[3] * py)
-                M1 = focal.y * (lens[4] * px + lens[5] * py)
+            if n.x * n.x + n.y * n.y <= camera.radius_limit * camera.radius_limit:
+                nx = qd.min(camera.limits[1], qd.max(camera.limits[0], n.x))
+                ny = qd.min(camera.limits[3], qd.max(camera.limits[2], n.y))
+                lens = distort(nx, ny, camera.coefficients, model)
+                px = (
+                    vec3(camera.W[0, 0], camera.W[0, 1], camera.W[0, 2])
+                    - nx * vec3(camera.W[2, 0], camera.W[2, 1], camera.W[2, 2])
+                ) / z
+                py = (
+                    vec3(camera.W[1, 0], camera.W[1, 1], camera.W[1, 2])
+                    - ny * vec3(camera.W[2, 0], camera.W[2, 1], camera.W[2, 2])
+                ) / z
+                M0 = camera.focal.x * (lens[2] * px + lens[3] * py)
+                M1 = camera.focal.y * (lens[4] * px + lens[5] * py)
                 at = 6 * i
                 C = qd.Matrix(
                     [
-                        [covariances[at], covariances[at + 1], covariances[at + 2]],
-                        [covariances[at + 1], covariances[at + 3], covariances[at + 4]],
-                        [covariances[at + 2], covariances[at + 4], covariances[at + 5]],
+                        [splats.covariances[at], splats.covariances[at + 1], splats.covariances[at + 2]],
+                        [splats.covariances[at + 1], splats.covariances[at + 3], splats.covariances[at + 4]],
+                        [splats.covariances[at + 2], splats.covariances[at + 4], splats.covariances[at + 5]],
                     ]
                 )
                 v0 = C @ M0
@@ -133,62 +168,66 @@ def project(
                     # Rounded covariances may be indefinite.
                     sharp = qd.max(0.0, a * c - b * b)
                     det = sharp + BLUR * (a + c + BLUR)
-                    o = opacities[i]
-                    if antialiased == 1:
+                    o = splats.opacities[i]
+                    if splats.antialiased == 1:
                         o *= qd.max(LEAST_COMPENSATION, qd.sqrt(sharp / det))
                     reach = 2.0 * qd.log(o / ALPHA_MIN)
-                    seen = distort(n.x, n.y, coefficients, model)
-                    u = focal.x * seen[0] + center.x
-                    v = focal.y * seen[1] + center.y
+                    seen = distort(n.x, n.y, camera.coefficients, model)
+                    u = camera.focal.x * seen[0] + camera.center.x
+                    v = camera.focal.y * seen[1] + camera.center.y
                     rx = qd.sqrt(qd.max(reach, 0.0) * (a + BLUR))
                     ry = qd.sqrt(qd.max(reach, 0.0) * (c + BLUR))
-                    inside = u + rx > 0.0 and v + ry > 0.0 and u - rx < size.x and v - ry < size.y
+                    inside = (
+                        u + rx > 0.0 and v + ry > 0.0 and u - rx < camera.size.x and v - ry < camera.size.y
+                    )
                     if reach > 0.0 and inside:
-                        tiles[4 * i] = qd.cast(qd.max(0.0, (u - rx) / TILE_PX), qd.i32)
-                        tiles[4 * i + 1] = qd.cast(qd.min(across - 1.0, (u + rx) / TILE_PX), qd.i32) + 1
-                        tiles[4 * i + 2] = qd.cast(qd.max(0.0, (v - ry) / TILE_PX), qd.i32)
-                        tiles[4 * i + 3] = qd.cast(qd.min(down - 1.0, (v + ry) / TILE_PX), qd.i32) + 1
+                        out.tiles[4 * i] = qd.cast(qd.max(0.0, (u - rx) / TILE_PX), qd.i32)
+                        out.tiles[4 * i + 1] = qd.cast(qd.min(across - 1.0, (u + rx) / TILE_PX), qd.i32) + 1
+                        out.tiles[4 * i + 2] = qd.cast(qd.max(0.0, (v - ry) / TILE_PX), qd.i32)
+                        out.tiles[4 * i + 3] = qd.cast(qd.min(down - 1.0, (v + ry) / TILE_PX), qd.i32) + 1
                         row = PACKED * i
-                        packed[row] = u - 0.5
-                        packed[row + 1] = v - 0.5
-                        packed[row + 2] = (c + BLUR) / det
-                        packed[row + 3] = -b / (c + BLUR)
-                        packed[row + 4] = 1.0 / (c + BLUR)
-                        packed[row + 5] = o
-                        packed[row + 9] = ry
+                        out.packed[row] = u - 0.5
+                        out.packed[row + 1] = v - 0.5
+                        out.packed[row + 2] = (c + BLUR) / det
+                        out.packed[row + 3] = -b / (c + BLUR)
+                        out.packed[row + 4] = 1.0 / (c + BLUR)
+                        out.packed[row + 5] = o
+                        out.packed[row + 9] = ry
                         distance = offset.norm()
                         e = offset / distance
-                        packed[row + 10] = distance
+                        out.packed[row + 10] = distance
                         along0 = e.dot(v0)
                         along1 = e.dot(v1)
                         slope_det = sharp + SLOPE_BLUR * (a + c + SLOPE_BLUR)
-                        packed[row + 11] = (along0 * (c + SLOPE_BLUR) - along1 * b) / slope_det
-                        packed[row + 12] = (along1 * (a + SLOPE_BLUR) - along0 * b) / slope_det
-                        if with_normals == 1:
-                            normal = vec3(normals[3 * i], normals[3 * i + 1], normals[3 * i + 2])
+                        out.packed[row + 11] = (along0 * (c + SLOPE_BLUR) - along1 * b) / slope_det
+                        out.packed[row + 12] = (along1 * (a + SLOPE_BLUR) - along0 * b) / slope_det
+                        if splats.with_normals == 1:
+                            normal = vec3(
+                                splats.normals[3 * i], splats.normals[3 * i + 1], splats.normals[3 * i + 2]
+                            )
                             sign = 1.0
                             if normal.dot(e) > 0.0:
                                 sign = -1.0
                             for j in qd.static(range(3)):
-                                packed[row + 13 + j] = sign * normal[j]
-                        if turned == 1:
+                                out.packed[row + 13 + j] = sign * normal[j]
+                        if splats.turned == 1:
                             first = 9 * i
                             back = vec3(0.0, 0.0, 0.0)
                             for j in qd.static(range(3)):
                                 for m in qd.static(range(3)):
-                                    back[j] += rotations[first + 3 * m + j] * e[m]
+                                    back[j] += splats.rotations[first + 3 * m + j] * e[m]
                             e = back
                         basis = sh_basis(e, K)
                         for channel in qd.static(range(3)):
                             color = 0.5
                             for j in qd.static(range(K)):
-                                color += basis[j] * sh[(i * K + j) * 3 + channel]
-                            packed[row + 6 + channel] = qd.max(0.0, color)
+                                color += basis[j] * splats.sh[(i * K + j) * 3 + channel]
+                            out.packed[row + 6 + channel] = qd.max(0.0, color)
 
 
 @qd.func
 def overlaps(packed: qd.template(), i: qd.i32, column: qd.i32, line: qd.i32):
-    """1 where alpha exceeds ALPHA_MIN at some point of a tile; see `splat_tiles.overlaps`."""
+    """1 where alpha exceeds ALPHA_MIN at some point of a tile; see `tile_binning.overlaps`."""
     row = PACKED * i
     x0 = column * TILE_PX - packed[row]
     y0 = line * TILE_PX - packed[row + 1]
@@ -249,7 +288,7 @@ def list_tiles(
 def blend(
     packed: F32, ids: I32, starts: I32, count: qd.i32, across: qd.i32, out: F32, channels: qd.template()
 ):
-    """Blends all tiles into out [tiles, channels, AREA]; see `splat_blending.blend`."""
+    """Blends all tiles into out [tiles, channels, AREA]; see `blending.blend`."""
     qd.loop_config(block_dim=AREA)
     for n in range(count * AREA):
         t = n // AREA
@@ -300,7 +339,7 @@ def opacity_before(
     out: F32,
     number: qd.i32,
 ):
-    """Opacity gathered before distances along the rays of pixels; see `splat_blending.opacity_before`."""
+    """Opacity gathered before distances along the rays of pixels; see `blending.opacity_before`."""
     for n in range(number):
         x = pixels[2 * n] - 0.5
         y = pixels[2 * n + 1] - 0.5

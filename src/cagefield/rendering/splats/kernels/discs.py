@@ -71,34 +71,16 @@ def interval(a, b, p, az, bz, pz, reach):
 
 
 @njit(parallel=True, **FAST)
-def project(
-    means,
-    tangents,
-    opacities,
-    sh,
-    rotations,
-    normals,
-    W,
-    origin,
-    focal,
-    center,
-    size,
-    limits,
-    model,
-    coefficients,
-    radius_limit,
-    near,
-    packed,
-    keys,
-    tiles,
-):
-    """Packs every disc that the picture can show, with its sorting key (depth z) and box of tiles.
+def project(discs, normals, camera, projected):
+    """Write the `ProjectedSplats` of the `DiscArgs` as seen by the `CameraArgs`.
 
-    packed [N,16]: 0-1 mean (pixel centres at whole numbers), 2-4 A, k, D, 5 opacity, 6-8 colour, 9
-    half-height of the region above ALPHA_MIN, 10 depth z, 11-12 e, f, 13-15 normal. tangents [N,6]: a, b in
-    the
-    world. The rest as `splat_projection.project`.
+    packed [N,16]: 0-1 mean (pixel centers at whole numbers), 2-4 A, k, D, 5 opacity, 6-8 color, 9
+    half-height of the region above ALPHA_MIN, 10 depth z, 11-12 e, f, 13-15 normal. `normals` [N,3] has no
+    rows where none are wanted. Discs that are not shown get an empty box of tiles.
     """
+    means, tangents, opacities, sh, rotations = discs
+    W, origin, focal, center, size, limits, model, coefficients, radius_limit, near = camera
+    packed, keys, tiles = projected
     across = (size[0] + TILE_PX - 1) // TILE_PX
     down = (size[1] + TILE_PX - 1) // TILE_PX
     terms = sh.shape[1]

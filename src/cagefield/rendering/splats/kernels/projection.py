@@ -147,41 +147,19 @@ def harmonics_at(x, y, z, terms, basis):
 
 
 @njit(parallel=True, **FAST)
-def project(
-    means,
-    covariances,
-    opacities,
-    sh,
-    rotations,
-    normals,
-    masses,
-    depths,
-    rows,
-    W,
-    origin,
-    focal,
-    center,
-    size,
-    limits,
-    model,
-    coefficients,
-    radius_limit,
-    near,
-    antialiased,
-    packed,
-    keys,
-    tiles,
-):
-    """Packs every splat of `rows` that the picture can show, with its sorting key (depth z) and box of tiles.
+def project(splats, normals, masses, depths, rows, camera, antialiased, projected):
+    """Write the `ProjectedSplats` of `rows` of the `SplatArgs` as seen by the `CameraArgs`.
 
-    `rotations` has no rows where no splat was turned, and `normals` none where none are wanted. Splats that
-    are not shown get an empty box. tiles: [N,4] x0, x1, y0, y1, ends excluded.
+    `normals` [N,3] has no rows where none are wanted. Splats that are not shown get an empty box of tiles.
 
-    `masses` [N,2] are those of representatives of many splats (`splat_clusters.merge`), or no rows: their
+    `masses` [N,2] are those of representatives of many splats (`splat_lod.merge`), or no rows: their
     optical depth on the screen is that of the splats they stand for, each blurred on its own, and their
     opacity the one whose Li2 is that depth over their own projected area. `depths` is the table of
     o (Li2) in equal steps of Li2 from 0 to Li2(ALPHA_MAX).
     """
+    means, covariances, opacities, sh, rotations = splats
+    W, origin, focal, center, size, limits, model, coefficients, radius_limit, near = camera
+    packed, keys, tiles = projected
     across = (size[0] + TILE_PX - 1) // TILE_PX
     down = (size[1] + TILE_PX - 1) // TILE_PX
     fx, fy = focal[0], focal[1]

@@ -7,7 +7,7 @@ dilogarithm: the integral of -log(1 - o exp(-r^2 / 2)) over the plane.
 
 A group's representative keeps the moments of its splats, weighted by w = Li2(o) A: mean, covariance (with
 the spread of the means), color, and its optical depth, as if all projected areas a were in the proportion
-of the areas A. Its opacity follows from the depth per screen area: see `splat_projection.project`.
+of the areas A. Its opacity follows from the depth per screen area: see `projection.project`.
 
 The oracle is in the tests: sums over the groups in float64, and every splat projected.
 
@@ -136,27 +136,14 @@ def rows_of(chosen, order, size, out):
 
 
 @njit(parallel=True, **FAST)
-def merge(
-    means,
-    covariances,
-    opacities,
-    sh,
-    rotations,
-    order,
-    size,
-    masses,
-    out_means,
-    out_covariances,
-    out_sh,
-    out_rotations,
-    out_masses,
-    out_apart,
-):
-    """Write the representatives of each `size` consecutive splats of `order`.
+def merge(splats, masses, order, size, merged):
+    """Write the `MergedSplats` of each `size` consecutive elements of `order` of the `SplatArgs`.
 
     masses [N,2] of the merged elements: sum of w over its own area, sum of Li2(o), or no rows for splats.
-    out_apart [M]: rms distance of the means from the representative's.
+    apart [M]: rms distance of the means from the representative's.
     """
+    means, covariances, opacities, sh, rotations = splats
+    out_means, out_covariances, out_sh, out_rotations, out_masses, out_apart = merged
     terms = sh.shape[1]
     turned = rotations.shape[0] > 0
     for g in prange(out_means.shape[0]):

@@ -8,7 +8,7 @@ from cagefield.compute.numba_cache import FAST, njit
 from cagefield.rendering.splats.kernels.projection import ALPHA_MIN, TILE_PX, clamped
 
 FILTER = 0.25
-"""F, in pixels^2: a disc is never thinner on the picture than a dot of the variance 2 F (`splat_discs`)."""
+"""F, in pixels^2: a disc is never thinner on the picture than a dot of the variance 2 F (`discs`)."""
 
 
 @njit(**FAST)

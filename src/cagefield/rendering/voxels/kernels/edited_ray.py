@@ -17,21 +17,21 @@ from cagefield.edits.device.kernels.lattice import displacement, first_node, to_
 from cagefield.edits.device.packing import (
     AFFINE,
     ALONE,
-    BOX,
     CENTER,
+    CHANGED_BOX,
     CONTINUOUS,
     EDGE,
     FIRST,
     LAST,
     MATRIX,
     NODE_BOX,
-    PART,
+    PART_PLACE,
     RECORD,
     RECORDS,
     RESOLUTION,
     SIMPLE,
     TO_NODES,
-    UNDER,
+    UNDER_PLACE,
 )
 from cagefield.rendering.voxels.kernels.grid import vec3
 from cagefield.rendering.voxels.kernels.ray_grid import safe_inverse, slab, vec2
@@ -71,7 +71,9 @@ def edited_ray(origin: vec3, d: vec3, edits: EditArgs):
     met = 0
     e = -1
     for n in range(edits.count):
-        box = slab(origin, inverse, read3(edits.params, n, BOX), read3(edits.params, n, BOX + 3))
+        box = slab(
+            origin, inverse, read3(edits.params, n, CHANGED_BOX), read3(edits.params, n, CHANGED_BOX + 3)
+        )
         if box.x <= box.y:
             met += 1
             e = n
@@ -91,8 +93,8 @@ def edited_ray(origin: vec3, d: vec3, edits: EditArgs):
                 )
             elif is_straight(edits.params, e):
                 ray.edit = e
-                ray.part = qd.cast(edits.params[e, PART], qd.i32)
-                ray.under = qd.cast(edits.params[e, UNDER], qd.i32)
+                ray.part = qd.cast(edits.params[e, PART_PLACE], qd.i32)
+                ray.under = qd.cast(edits.params[e, UNDER_PLACE], qd.i32)
                 ray.outer = vec2(1e30, -1e30)
                 if edits.params[e, LAST] > 1.5:
                     ray.outer, _at = through(origin, d, edits.params, e, RECORDS + RECORD)

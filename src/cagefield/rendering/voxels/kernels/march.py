@@ -80,6 +80,21 @@ class MarchArgs:
     preserve_opacity: qd.i32
 
 
+@dataclass(frozen=True, eq=False)
+class EmptySpaceArgs:
+    """Empty and unedited space, over which rays leap.
+
+    Attributes:
+        bricks: occupancy of the deformed field.
+        canonical_bricks: occupancy of the field as it was trained; begins at 0.
+        edit_boxes: [B,2,3], the deformed-space boxes outside which no edit changes anything.
+    """
+
+    bricks: OccupancyArgs
+    canonical_bricks: OccupancyArgs
+    edit_boxes: F32
+
+
 @qd.kernel(fastcache=True)
 def march_tiles(
     out: F32,
@@ -88,10 +103,8 @@ def march_tiles(
     tiles: TileArgs,
     march: MarchArgs,
     grid: GridArgs,
-    bricks: OccupancyArgs,
-    canonical_bricks: OccupancyArgs,
+    space: EmptySpaceArgs,
     edits: EditArgs,
-    boxes: F32,
     K: qd.template(),
     contracted: qd.template(),
     edited: qd.template(),
@@ -101,9 +114,8 @@ def march_tiles(
 
     out: [size.y * size.x, 8]: premultiplied rgb, opacity, sum of w t, and the premultiplied normal.
 
-    boxes: [B,2,3], the deformed-space boxes outside which no edit changes anything. The part of a ray that
-    may lie in them is found first; only its samples in occupied blocks evaluate the edits' maps. `bricks` are
-    those of the deformed field, `canonical_bricks`, which begin at 0, those of the field as it was trained.
+    The part of a ray that may lie in the edits' boxes is found first; only its samples in occupied blocks
+    evaluate the edits' maps.
     """
     across = (tiles.size.x + MARCH_TILE_PX - 1) // MARCH_TILE_PX
     qd.loop_config(block_dim=64)
@@ -126,8 +138,8 @@ def march_tiles(
             t = march.near
             t_end = 1e30
             if qd.static(not contracted):
-                lo = qd.cast(bricks.origin, qd.f32)
-                hit = slab(go, inverse, lo, lo + 4.0 * qd.cast(bricks.dims, qd.f32))
+                lo = qd.cast(space.bricks.origin, qd.f32)
+                hit = slab(go, inverse, lo, lo + 4.0 * qd.cast(space.bricks.dims, qd.f32))
                 t = qd.max(hit.x, march.near) + 0.5 * march.step
                 t_end = hit.y
             edit_in = 1e30
@@ -136,13 +148,13 @@ def march_tiles(
             turned = basis
             if qd.static(edited):
                 world = safe_inverse(d)
-                for k in range(boxes.shape[0] // 6):
+                for k in range(space.edit_boxes.shape[0] // 6):
                     at = 6 * k
                     through = slab(
                         camera.origin,
                         world,
-                        vec3(boxes[at], boxes[at + 1], boxes[at + 2]),
-                        vec3(boxes[at + 3], boxes[at + 4], boxes[at + 5]),
+                        vec3(space.edit_boxes[at], space.edit_boxes[at + 1], space.edit_boxes[at + 2]),
+                        vec3(space.edit_boxes[at + 3], space.edit_boxes[at + 4], space.edit_boxes[at + 5]),
                     )
                     if through.x <= through.y:
                         edit_in = qd.min(edit_in, through.x)
@@ -157,7 +169,7 @@ def march_tiles(
             depth = 0.0
             while t < t_end and T > 1e-3:
                 g, h, empty, leap, last = look_ahead(
-                    bricks, go + t * gd, gd, inverse, grid.half, march.step, contracted
+                    space.bricks, go + t * gd, gd, inverse, grid.half, march.step, contracted
                 )
                 if qd.static(contracted):
                     if last == 1:
@@ -178,7 +190,7 @@ def march_tiles(
                     if g.min() < 0.0 or (g - qd.cast(grid.resolution - 1, qd.f32)).max() > 0.0:
                         place = -1
                     if qd.static(edited):
-                        if moved != STAYED and place == 0 and not is_occupied(canonical_bricks, g):
+                        if moved != STAYED and place == 0 and not is_occupied(space.canonical_bricks, g):
                             place = -1
                     if place >= 0:
                         cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), grid.resolution - 2), 0)

@@ -15,11 +15,15 @@ estimation in emission tomography" (1995).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import prange
+from numpy.typing import NDArray
 
 from cagefield.compute.numba_cache import FAST, njit
 from cagefield.rendering.splats.kernels.projection import AREA, MAX_TERMS, TILE_PX, harmonics_at
+from cagefield.typing import Array, Float32
 
 MOMENTUM_FLOATS, RUNNING_FLOATS = 13, 17
 """Floats of a splat's running gradient, and of its running curvature (the last is the sum of weights)."""
@@ -28,6 +32,39 @@ CURRENT_CURVATURE_SHARE = 0.5
 """Share of the current photo's curvature added to the running curvature.
 
 Without it, the steps of a photo taken from close by are too long for that photo."""
+
+
+class AverageArgs(NamedTuple):
+    """Running means over the views of each splat.
+
+    Gradient [N,MOMENTUM_FLOATS], curvature [N,RUNNING_FLOATS], number of steps taken [N].
+    """
+
+    momentum: Float32
+    running: Float32
+    ticks: NDArray[np.int32]
+
+
+class StepArgs(NamedTuple):
+    """Rule of a Gauss-Newton step.
+
+    Attributes:
+        memory: [2] decay of the running gradient and of the running curvature.
+        rates: [5] of mean, log scales, rotation, logit, color.
+        damping: [2] relative to the block, and absolute.
+        caps: [2] largest change of log scales and rotations; of the mean, in largest sigmas.
+        terms: number of harmonics in use.
+        scale_range: [2] least and largest sigma, world units.
+        pull: added to the logit's gradient.
+    """
+
+    memory: Array
+    rates: Array
+    damping: Array
+    caps: Array
+    terms: int
+    scale_range: Array
+    pull: float
 
 
 @njit(parallel=True, **FAST)
@@ -112,35 +149,14 @@ def clamp_size(value, cap):
 
 
 @njit(parallel=True, **FAST)
-def gauss_newton(
-    order,
-    gradients,
-    curvatures,
-    means,
-    log_scales,
-    quaternions,
-    logits,
-    sh,
-    origin,
-    momentum,
-    running,
-    ticks,
-    memory,
-    rates,
-    damping,
-    caps,
-    terms,
-    scale_range,
-    pull,
-):
-    """Take one step of the splats in `order`.
+def gauss_newton(order, gradients, curvatures, parameters, origin, averages, step):
+    """Take one step of the splats in `order`, seen from `origin` [3].
 
-    memory: decay of the running gradient and of the running curvature. rates: mean, log scales, rotation,
-    logit, color. damping: relative to the block, and absolute. caps: log scales and rotations; mean, in
-    largest sigmas.
-    terms: number of harmonics in use. scale_range: (least, largest) sigma. pull: added to the logit's
-    gradient.
+    `parameters` are `splat_backward.ParameterArgs`, `averages` `AverageArgs`, `step` `StepArgs`.
     """
+    means, log_scales, quaternions, logits, sh = parameters
+    momentum, running, ticks = averages
+    memory, rates, damping, caps, terms, scale_range, pull = step
     for q in prange(order.size):
         i = order[q]
         ticks[i] += 1
@@ -180,8 +196,8 @@ def gauss_newton(
             clamp_size(-rates[2] * g[7] / (H[13] + damp), cap),
             clamp_size(-rates[2] * g[8] / (H[14] + damp), cap),
         )
-        step = -rates[3] * (g[9] + pull) / (H[15] * (1.0 + rel) + tiny)
-        logits[i] = clamp_size(logits[i] + clamp_size(step, 4.0 * cap), 7.0)
+        change = -rates[3] * (g[9] + pull) / (H[15] * (1.0 + rel) + tiny)
+        logits[i] = clamp_size(logits[i] + clamp_size(change, 4.0 * cap), 7.0)
         dx = np.float64(means[i, 0]) - origin[0]
         dy = np.float64(means[i, 1]) - origin[1]
         dz = np.float64(means[i, 2]) - origin[2]
@@ -192,6 +208,6 @@ def gauss_newton(
         for j in range(terms):
             norm += basis[j] * basis[j]
         for ch in range(3):
-            step = -rates[4] * gradients[i, 10 + ch] / (norm * (H[16] + 1e-2))
+            change = -rates[4] * gradients[i, 10 + ch] / (norm * (H[16] + 1e-2))
             for j in range(terms):
-                sh[i, j, ch] += step * basis[j]
+                sh[i, j, ch] += change * basis[j]

@@ -20,9 +20,12 @@ Source: derived here; the classic gradients are in Kerbl et al. (2023), appendix
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba as nb
 import numpy as np
 from numba import prange
+from numpy.typing import NDArray
 
 from cagefield.compute.numba_cache import FAST, njit
 from cagefield.rendering.splats.kernels.projection import (
@@ -33,6 +36,7 @@ from cagefield.rendering.splats.kernels.projection import (
     distort,
     harmonics_at,
 )
+from cagefield.typing import Float32
 
 GRADIENT_FLOATS = 16
 """0-2 mean, 3-5 log scales, 6-8 turn, 9 logit, 10-12 color, 13 |dL/d(projected mean)|, 14 sum of weights,
@@ -42,6 +46,25 @@ CURVATURE_FLOATS = 16
 
 LENS_STEP = 1e-4
 """Finite-difference step of the lens's second derivative, in normalized coordinates n."""
+
+
+class ParameterArgs(NamedTuple):
+    """Parameters of N splats, as `SplatState`."""
+
+    means: Float32
+    log_scales: Float32
+    quaternions: Float32
+    logits: Float32
+    sh: Float32
+
+
+class PairArgs(NamedTuple):
+    """Pairs (tile, splat) of an image, as `Projection`, and the sums [pairs,SUMS] of their pixels."""
+
+    order: NDArray[np.int64]
+    firsts: NDArray[np.int64]
+    slots: NDArray[np.int32]
+    sums: Float32
 
 
 @njit(**FAST)
@@ -66,32 +89,17 @@ def bilinear(a, b, c, x0, y0, x1, y1):
 
 @njit(parallel=True, **FAST)
 def backpropagate(
-    order,
-    firsts,
-    slots,
-    sums,
-    packed,
-    means,
-    log_scales,
-    quaternions,
-    opacities,
-    sh,
-    W,
-    origin,
-    focal,
-    limits,
-    model,
-    coefficients,
-    antialiased,
-    directional,
-    gradients,
-    curvatures,
+    pairs, packed, parameters, opacities, camera, antialiased, directional, gradients, curvatures
 ):
-    """Write gradients [N,GRADIENT_FLOATS] and curvatures [N,CURVATURE_FLOATS] of the splats in `order`.
+    """Write gradients [N,GRADIENT_FLOATS] and curvatures [N,CURVATURE_FLOATS] of the splats in `pairs`.
 
-    The color's gradient is before its clamp at 0. `directional` adds the mean's gradient through the viewing
-    direction of the color, where the clamp is inactive.
+    `pairs` are `PairArgs`, `parameters` `ParameterArgs`, `camera` the `CameraArgs` of the image whose splats
+    are `packed` with `opacities` [N]. The color's gradient is before its clamp at 0. `directional` adds the
+    mean's gradient through the viewing direction of the color, where the clamp is inactive.
     """
+    order, firsts, slots, sums = pairs
+    means, log_scales, quaternions, _, sh = parameters
+    W, origin, focal, _, _, limits, model, coefficients, _, _ = camera
     fx, fy = focal[0], focal[1]
     terms = sh.shape[1]
     for q in prange(order.size):

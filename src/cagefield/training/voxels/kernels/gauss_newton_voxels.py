@@ -1,8 +1,28 @@
 """Kernels that update densities and colors from a batch's records: Laplacian, diagonal Gauss-Newton step."""
 
+from dataclasses import dataclass
+
 from cagefield.compute.quadrants import qd
 from cagefield.rendering.voxels.kernels.grid import F32, I32, ivec3
 from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS
+
+
+@dataclass(frozen=True, eq=False)
+class StepArgs:
+    """Rule of a diagonal Gauss-Newton step.
+
+    `decay` of the running curvatures per batch. The density moves by at most max_step / h, h the world-space
+    voxel size; `damping` is added to the color curvature, and times h^2 to the density curvature.
+    View-dependent coefficients c get the gradient of view_dependence_reg/2 * c^2 per unit of color curvature:
+    small against the evidence of photos from many sides, and a damping without it.
+    """
+
+    decay: qd.f32
+    density_rate: qd.f32
+    color_rate: qd.f32
+    max_step: qd.f32
+    damping: qd.f32
+    view_dependence_reg: qd.f32
 
 
 @qd.kernel(fastcache=True)
@@ -83,22 +103,13 @@ def gauss_newton(
     record: qd.i32,
     workers: qd.i32,
     slots: qd.i32,
-    decay: qd.f32,
-    density_rate: qd.f32,
-    color_rate: qd.f32,
-    max_step: qd.f32,
-    damping: qd.f32,
-    view_dependence_reg: qd.f32,
+    step: StepArgs,
     K: qd.template(),
 ):
     """Take one diagonal Gauss-Newton step of every slot in the batch, and empty the accumulators.
 
     state: [slots, 2] running sums of density and color curvature, decayed per batch with the slot.
     weight: [slots] maximum weight since the last pruning. cell: [slots] world-space voxel size h.
-    The density moves by at most max_step / h; `damping` is added to the color curvature, and times h^2
-    to the density curvature. View-dependent coefficients c get the gradient of view_dependence_reg/2 * c^2
-    per
-    unit of color curvature: small against the evidence of photos from many sides, and a damping without it.
     """
     qd.loop_config(block_dim=256)
     for slot in range(1, slots):
@@ -110,8 +121,8 @@ def gauss_newton(
             h_density += accumulator[at + 1]
             h_color += accumulator[at + 2]
         if h_color > 0.0:
-            s0 = state[2 * slot] * decay + h_density
-            s1 = state[2 * slot + 1] * decay + h_color
+            s0 = state[2 * slot] * step.decay + h_density
+            s1 = state[2 * slot + 1] * step.decay + h_color
             state[2 * slot] = s0
             state[2 * slot + 1] = s1
             g_density = 0.0
@@ -123,10 +134,10 @@ def gauss_newton(
                 for a in qd.static(range(HEADER_FLOATS)):
                     accumulator[at + a] = 0.0
             weight[slot] = w
-            change = density_rate * g_density / (s0 + damping * cell[slot] * cell[slot])
-            limit = max_step / cell[slot]
+            change = step.density_rate * g_density / (s0 + step.damping * cell[slot] * cell[slot])
+            limit = step.max_step / cell[slot]
             density[slot] = density[slot] - qd.max(qd.min(change, limit), -limit)
-            rate = color_rate / (s1 + damping)
+            rate = step.color_rate / (s1 + step.damping)
             for j in qd.static(range(3 * K)):
                 g = 0.0
                 for worker in range(workers):
@@ -135,5 +146,5 @@ def gauss_newton(
                     accumulator[at] = 0.0
                 c = sh[slot * (3 * K) + j]
                 if qd.static(j >= 3):
-                    g += view_dependence_reg * h_color * c
+                    g += step.view_dependence_reg * h_color * c
                 sh[slot * (3 * K) + j] = c - rate * g

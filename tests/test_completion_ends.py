@@ -22,9 +22,9 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.scene.scene import Scene
 from solid_fields import solid_field
-from test_bending_light import INNER, LIGHT, OUTER
-from test_bending_light import room as gap_room
-from test_patches import cage, cameras, room
+from test_completion import cage, cameras, room
+from test_continuous_relighting import INNER, LIGHT, OUTER
+from test_continuous_relighting import room as gap_room
 
 
 def handle(held: bool) -> VoxelField:
