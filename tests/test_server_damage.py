@@ -9,6 +9,7 @@ import pytest
 
 from cagefield.cameras.camera import Camera
 from cagefield.completion.lighting.ambient_occlusion import LightModel, occlusion_radii
+from cagefield.completion.patcher import PatchStage
 from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
 from cagefield.geometry.cage import Cage
@@ -18,6 +19,7 @@ from cagefield.server.render_queue.damage import WHOLE, Rect, Showing, pixels, s
 from cagefield.server.render_queue.patch_extent import PatchExtent
 from cagefield.server.render_queue.requests import Request
 from cagefield.server.render_queue.scheduler import SETTLE_SECONDS, Scheduler
+from cagefield.server.render_worker.refinement import FINAL
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.tasks import PictureDone, PictureTask, Shown, Stopped, values_of
 from cagefield.server.render_worker.view import Display, Region
@@ -190,7 +192,7 @@ class Bench:
             while (request := self.scheduler.next(self.now)) is not None:
                 self.now += 0.02
                 rays = request.region.width * request.region.height
-                self.scheduler.finished(request, rays, rays / 1e6, 0.0)
+                self.scheduler.finished(request, rays, rays / 1e6, 0.0, FINAL)
                 self.scheduler.presented(1, request.number)
                 found.append(request)
             self.now += SETTLE_SECONDS + 1e-3
@@ -213,7 +215,7 @@ def test_a_drag_renders_the_part_that_it_changes_and_rest_too() -> None:
     bench.scheduler.edits(2, True, bench.now)
     bench.scheduler.edits(2, False, bench.now)
     rest = [request for request in bench.all() if not request.moving]
-    assert 0.125 <= share(rest) < 0.14 and rest[-1].final and rest[-1].exact
+    assert 0.125 <= share(rest) < 0.14 and rest[-1].last
     assert bench.scheduler.idle()
     # A part has more pixels than it would have in a picture of everything.
     assert moving[0].region.full_width > 1.2 * Bench().all()[0].region.full_width
@@ -245,7 +247,7 @@ def test_revisions_that_a_page_may_show_are_remembered() -> None:
     for revision in (2, 3):
         bench.scheduler.edits(revision, True, bench.now)
         assert bench.scheduler.remembered() == {0, 1, revision}
-    bench.scheduler.finished(request, 1000, 0.01, 0.0)
+    bench.scheduler.finished(request, 1000, 0.01, 0.0, FINAL)
     assert bench.scheduler.remembered() == {0, 1, 3}
 
 
@@ -320,10 +322,12 @@ def test_edits_that_stay_keep_their_shadows_while_another_moves(shaded: Scene) -
     edits = [PATCHED["copy"], PATCHED["move"]]
     settled = shaded.patcher.prepare(edits)
     moved = [edits[0], edits[1].translate((0, 0, 0.1))]
-    moving = shaded.patcher.prepare(moved, moving=True)
+    moving = shaded.patcher.prepare(moved, stage=PatchStage.INPAINTED)
     assert moving[0].patch is settled[0].patch is not None
     assert moving[1].patch is not None and moving[1].patch.part is None
-    assert shaded.patcher.prepare([edits[0].translate((0, 0, 0.1))], moving=True)[0].patch is None
+    assert (
+        shaded.patcher.prepare([edits[0].translate((0, 0, 0.1))], stage=PatchStage.INPAINTED)[0].patch is None
+    )
 
 
 @pytest.mark.parametrize("view", ["colour", "depth", "opacity", "normals"])
@@ -332,7 +336,7 @@ def test_a_part_over_the_last_picture_is_the_whole_picture(renderers: RendererCa
     display = Display(view, split=0.55)
 
     def shown(edits: tuple[Edit, ...], region: Region) -> np.ndarray[Any, Any]:
-        task = PictureTask(1, Shown(values_of(edits)), CAMERA, region, display, False, True, 0)
+        task = PictureTask(1, Shown(values_of(edits)), CAMERA, region, display, False, FINAL, 0)
         done = renderers.picture(task, lambda: False)
         assert isinstance(done, PictureDone)
         return pixels_of(done.picture, done.format, region.width, region.height).astype(float)
@@ -351,7 +355,7 @@ def test_a_refresh_that_is_given_up_leaves_nothing_half_done() -> None:
     renderers = RendererCache(ball_scene())
     edits = tuple(edit.replace(relight="none") for edit in (PART.translate((0.12, 0, 0)), OTHER))
     whole = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
-    task = PictureTask(1, Shown(values_of(edits)), CAMERA, whole, Display(), False, True, 0)
+    task = PictureTask(1, Shown(values_of(edits)), CAMERA, whole, Display(), False, FINAL, 0)
     expected = VoxelRenderer(renderers.scene.field, EditStack(edits))
     for looks in range(1, 6):
         left = looks
@@ -363,7 +367,7 @@ def test_a_refresh_that_is_given_up_leaves_nothing_half_done() -> None:
 
         assert isinstance(renderers.picture(task, stop), Stopped)
         if looks <= 4:  # between the passes; later, between bands of the picture
-            assert renderers.edited.exact == []
+            assert renderers.edited.final == []
     done = renderers.picture(task, lambda: False)
     assert isinstance(done, PictureDone)
-    assert np.array_equal(renderers.edited.exact[-1].occupancy.codes, expected.occupancy.codes)
+    assert np.array_equal(renderers.edited.final[-1].occupancy.codes, expected.occupancy.codes)

@@ -21,6 +21,7 @@ from cagefield.server.render_queue.dispatcher import (
     TooManyError,
 )
 from cagefield.server.render_queue.requests import Request
+from cagefield.server.render_worker.refinement import FINAL
 from cagefield.server.render_worker.tasks import (
     Answered,
     Failed,
@@ -80,7 +81,7 @@ class PlayedDispatcher:
             request.region,
             request.display,
             request.moving,
-            request.exact,
+            request.refinement,
             generation,
         )
         return task, Stamp(1)
@@ -129,7 +130,7 @@ async def settle() -> None:
 
 
 def done(task: Task) -> PictureDone:
-    return PictureDone(task.number, b"", "rgb", b"", (0, 0), 1.0, 0.0, 0.01, 0.0)
+    return PictureDone(task.number, b"", "rgb", b"", FINAL, (0, 0), 1.0, 0.0, 0.01, 0.0)
 
 
 def surface(number: int) -> SurfaceTask:

@@ -17,6 +17,7 @@ from cagefield.compute import devices
 from cagefield.edits import Edit
 from cagefield.geometry.cage import Cage
 from cagefield.server.render_worker import page_files, renderer_cache, unused_memory
+from cagefield.server.render_worker.refinement import Refinement
 from cagefield.server.render_worker.renderer_cache import KEPT_EDITS, RendererCache
 from cagefield.server.render_worker.tasks import PageEditsTask, Shown, values_of
 from cagefield.server.render_worker.unused_memory import UnusedMemory
@@ -71,8 +72,8 @@ def test_edits_that_are_not_kept_are_nowhere(
     seen = []
     for number in range(4):
         shown = Shown(values_of((_moved(number).replace(lattice=lattice),)))
-        renderers.renderer(shown, exact=False)
-        pages.edits(PageEditsTask(1, shown, False, (), 0), lambda: False)
+        renderers.renderer(shown, Refinement.DRAFT)
+        pages.edits(PageEditsTask(1, shown, Refinement.DRAFT, (), 0), lambda: False)
         drawn = pages._prepared(renderers.known_edits[0])  # the edit itself, or one with a lattice
         seen.append((weakref.ref(renderers.known_edits[0]), weakref.ref(drawn)))
         del drawn

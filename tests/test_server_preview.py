@@ -20,6 +20,7 @@ from cagefield.server.editor.path_edits import edits_at_time
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import client_messages, common
 from cagefield.server.protocol.conversion import MOST_STILLS, STILLS_PER_SECOND, stills_of
+from cagefield.server.render_worker.refinement import Refinement
 from cagefield.server.render_worker.tasks import PictureTask, Shown, values_of
 from cagefield.server.web.handlers import MessageHandlers
 from cagefield.server.web.launch import open_scene
@@ -246,7 +247,7 @@ def test_all_pages_show_the_preview_and_are_told_of_its_beginning_and_its_end(pl
         [e.fields["operations"][0].by for e in expected.edits],
     )
     for task in (played.rendered(), played.rendered()):  # one for each page
-        assert task.shown == coordinator.shown() and task.moving and not task.exact
+        assert task.shown == coordinator.shown() and task.moving and task.refinement == Refinement.DRAFT
     late = coordinator.join(played.hello)
     told = [json.loads(asyncio.run(late.send_queue.get())) for _ in range(len(late.send_queue))]
     assert [m["play"] for m in told if m["type"] == "preview"] == [4]

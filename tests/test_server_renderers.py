@@ -25,6 +25,7 @@ from cagefield.server.render_queue import jobs
 from cagefield.server.render_queue.background import BackgroundWork
 from cagefield.server.render_worker.grid_lines import grid_lines
 from cagefield.server.render_worker.job_files import MARK
+from cagefield.server.render_worker.refinement import FINAL, Refinement
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.task_handlers import SAMPLES, TaskHandlers
 from cagefield.server.render_worker.tasks import (
@@ -72,9 +73,9 @@ def task(
     region: Region = WHOLE,
     display: Display = Display(),  # noqa: B008  immutable
     moving: bool = False,
-    exact: bool = True,
+    refinement: Refinement = FINAL,
 ) -> PictureTask:
-    return PictureTask(1, Shown(values_of(edits)), CAMERA, region, display, moving, exact, 0)
+    return PictureTask(1, Shown(values_of(edits)), CAMERA, region, display, moving, refinement, 0)
 
 
 def picture(renderers: RendererCache, asked: PictureTask) -> np.ndarray[Any, Any]:
@@ -91,7 +92,7 @@ def test_pictures_are_those_of_the_scene(renderers: RendererCache) -> None:
 
 def test_tiles_put_together_are_the_whole_picture(renderers: RendererCache) -> None:
     whole = renderers.part(
-        task(MOVED), renderers.renderer(task(MOVED).shown, exact=True), WHOLE, lambda: False
+        task(MOVED), renderers.renderer(task(MOVED).shown, FINAL).renderer, WHOLE, lambda: False
     )
     assert whole is not None
     joined = np.zeros_like(whole.rgb)
@@ -99,7 +100,7 @@ def test_tiles_put_together_are_the_whole_picture(renderers: RendererCache) -> N
         for y, height in ((0, 21), (21, 27)):
             part = renderers.part(
                 task(MOVED),
-                renderers.renderer(task(MOVED).shown, exact=True),
+                renderers.renderer(task(MOVED).shown, FINAL).renderer,
                 Region(x, y, width, height, SIDE, SIDE),
                 lambda: False,
             )
@@ -112,8 +113,10 @@ def test_tiles_put_together_are_the_whole_picture(renderers: RendererCache) -> N
 def test_quick_pictures_show_the_same(renderers: RendererCache, edits: tuple[Edit, ...]) -> None:
     # Shadows do not go along before a cage is let go, and seams do not blend.
     shown = Shown(values_of(tuple(edit.replace(relight="none", feather=0.0) for edit in edits)))
-    quick = renderers.part(task(*edits), renderers.renderer(shown, exact=False), WHOLE, lambda: False)
-    exact = renderers.part(task(*edits), renderers.renderer(shown, exact=True), WHOLE, lambda: False)
+    quick = renderers.part(
+        task(*edits), renderers.renderer(shown, Refinement.DRAFT).renderer, WHOLE, lambda: False
+    )
+    exact = renderers.part(task(*edits), renderers.renderer(shown, FINAL).renderer, WHOLE, lambda: False)
     assert quick is not None and exact is not None
     # The lattices are the same here (24 nodes), and what the coarse occupancy adds is empty.
     np.testing.assert_array_equal(quick.rgb, exact.rgb)
@@ -121,7 +124,7 @@ def test_quick_pictures_show_the_same(renderers: RendererCache, edits: tuple[Edi
 
 def test_a_quick_lattice_is_coarser_and_close(renderers: RendererCache) -> None:
     fine = MOVED.replace(lattice=96)
-    quick = renderers.renderer(Shown(values_of((fine,))), exact=False)
+    quick = renderers.renderer(Shown(values_of((fine,))), Refinement.DRAFT).renderer
     assert quick.edits[0].edit.lattice == 32
     near = renderers.part(task(fine), quick, WHOLE, lambda: False)
     assert near is not None
@@ -176,7 +179,7 @@ def test_edits_that_stay_are_not_prepared_again(renderers: RendererCache) -> Non
     again = renderers.edits(values_of((MOVED, COPY.translate((0.1, 0, 0)))))
     assert again[0] is first[0] and again[1] is not first[1]
     shown = Shown(values_of((MOVED,)))
-    assert renderers.renderer(shown, exact=True) is renderers.renderer(shown, exact=False)
+    assert renderers.renderer(shown, FINAL) is renderers.renderer(shown, Refinement.DRAFT)
 
 
 def test_an_impossible_edit_is_an_error(renderers: RendererCache) -> None:
@@ -201,8 +204,8 @@ def test_what_is_warm_is_not_compiled_again_by_drags(renderers: RendererCache) -
     warm = [set(kernel.materialized_kernels) for kernel in used]
     assert all(warm)
     for edit in (MOVED, Edit.delete(Cage.box((0.3, 0.1, 0.0), 0.2))):
-        for moving, exact in ((True, False), (False, True)):
-            renderers.picture(replace(task(edit), moving=moving, exact=exact), lambda: False)
+        for moving, refinement in ((True, Refinement.DRAFT), *((False, each) for each in Refinement)):
+            renderers.picture(replace(task(edit), moving=moving, refinement=refinement), lambda: False)
     assert [set(kernel.materialized_kernels) for kernel in used] == warm
 
 

@@ -14,6 +14,7 @@ from cagefield.server.render_queue.scheduler import (
     SETTLE_SECONDS,
     Scheduler,
 )
+from cagefield.server.render_worker.refinement import FINAL, Refinement
 from cagefield.server.render_worker.view import Display
 
 SIDE = 800
@@ -23,7 +24,11 @@ RATE = 1e6
 class Bench:
     """A scheduler with a renderer of RATE rays a second, and pages that show pictures when told to."""
 
-    def __init__(self, rate: float = RATE, differing: Differing = everywhere) -> None:
+    def __init__(
+        self, rate: float = RATE, differing: Differing = everywhere, least: Refinement = FINAL
+    ) -> None:
+        """`least`: refinement that a draft has already, as where nothing refines it."""
+        self.least = least
         self.scheduler = Scheduler(differing)
         self.now = 0.0
         self.rate = rate
@@ -40,7 +45,7 @@ class Bench:
         rays = request.region.width * request.region.height
         seconds = rays / self.rate + overhead
         self.now += seconds
-        self.scheduler.finished(request, rays, seconds, overhead)
+        self.scheduler.finished(request, rays, seconds, overhead, max(self.least, request.refinement))
         self.sent.append(request)
 
     def show(self, page: int) -> None:
@@ -62,7 +67,7 @@ class Bench:
         request = self.scheduler.next(self.now)
         if not isinstance(request, EditsRequest):
             return None
-        self.scheduler.sent(request)
+        self.scheduler.sent(request, max(self.least, request.refinement))
         return request
 
     def settle(self) -> None:
@@ -93,8 +98,8 @@ def test_a_new_page_gets_a_quick_picture_and_then_the_whole_one_in_tiles() -> No
     assert b.step() is None
     b.settle()
     tiles = b.finish()
-    assert all(tile.region.full_width == SIDE and not tile.moving and tile.exact for tile in tiles)
-    assert [tile.final for tile in tiles] == [False] * (len(tiles) - 1) + [True]
+    assert all(tile.region.full_width == SIDE and not tile.moving for tile in tiles)
+    assert [tile.last for tile in tiles] == [False] * (len(tiles) - 1) + [True]
     assert 1 < len(tiles) <= MAX_TILES
     covered = pixels(tiles)
     assert len(covered) == SIDE * SIDE == len(set(covered))
@@ -241,17 +246,19 @@ def test_a_lost_picture_is_rendered_again_and_an_impossible_one_is_not() -> None
 
 
 def test_while_a_drag_goes_on_pictures_are_quick_and_tiles_too() -> None:
-    b = Bench()
+    b = Bench(least=Refinement.DRAFT)
     b.open(1)
     b.step()
     b.scheduler.edits(1, True, b.now)
     picture = b.step()
-    assert picture is not None and picture.moving and not picture.exact and picture.revision == 1
+    assert picture is not None and picture.moving and picture.revision == 1
     b.settle()
-    assert {tile.exact for tile in b.finish()} == {False}
+    assert {tile.refinement for tile in b.finish()} == {Refinement.DRAFT}
     b.scheduler.edits(1, False, b.now)
     tiles = b.finish()
-    assert {(tile.exact, tile.moving) for tile in tiles} == {(True, False)} and tiles[-1].final
+    assert not any(tile.moving for tile in tiles) and tiles[-1].last
+    assert [tile.refinement for tile in tiles] == sorted(tile.refinement for tile in tiles)
+    assert {tile.refinement for tile in tiles} == set(Refinement)
 
 
 def test_tiles_of_a_held_drag_cover_its_coarse_pictures() -> None:
@@ -265,7 +272,7 @@ def test_tiles_of_a_held_drag_cover_its_coarse_pictures() -> None:
     assert quick is not None and quick.moving and quick.region.full_width < SIDE
     bench.settle()
     tiles = bench.finish()
-    assert tiles and not any(tile.moving or tile.exact for tile in tiles)
+    assert tiles and not any(tile.moving for tile in tiles)
     r, size = quick.region, SIDE / quick.region.full_width
     # The quick picture's part in pixels of the whole view: wider than what it shows, by its own large pixels.
     assert min(t.region.x for t in tiles) <= r.x * size
@@ -284,7 +291,7 @@ def test_a_drag_that_ends_with_something_new_shows_it_quickly_first() -> None:
     picture = b.step()
     assert picture is not None and picture.moving and picture.revision == 2
     # And then nothing has to settle: nothing moves any more.
-    assert {(tile.exact, tile.moving) for tile in b.finish()} == {(True, False)}
+    assert {tile.moving for tile in b.finish()} == {False}
 
 
 def test_an_edit_is_shown_on_every_page_and_a_camera_on_its_own() -> None:
@@ -345,7 +352,7 @@ def test_a_page_that_left_is_not_rendered_for() -> None:
     request = b.scheduler.next(b.now)
     assert request is not None
     b.scheduler.leave(1)
-    b.scheduler.finished(request, 100, 0.1, 0.0)
+    b.scheduler.finished(request, 100, 0.1, 0.0, FINAL)
     assert b.scheduler.next(b.now) is None and b.scheduler.wake(b.now) is None
 
 
@@ -378,12 +385,12 @@ def drawing(here: DrawnHere, differing: Differing = everywhere) -> Bench:
 def test_a_page_that_draws_gets_the_edits_of_a_drag_one_at_a_time_and_no_pictures() -> None:
     b = drawing("moving")
     first = b.edits()
-    assert first is not None and first.exact
+    assert first is not None and not first.moving
     b.scheduler.presented(1, first.number)
     b.finish()
     b.scheduler.edits(2, True, b.now)
     one = b.edits()
-    assert one is not None and (one.revision, one.exact) == (2, False)
+    assert one is not None and (one.revision, one.moving) == (2, True)
     # The page has not shown it yet: newer ones wait, and the older of them are passed over.
     b.scheduler.edits(3, True, b.now)
     b.scheduler.edits(4, True, b.now)
@@ -397,7 +404,7 @@ def test_a_page_that_draws_gets_the_edits_of_a_drag_one_at_a_time_and_no_picture
     # Let go: the edits with their own lattices, then the whole picture, for all of it is the page's own.
     b.scheduler.edits(4, False, b.now)
     last = b.edits()
-    assert last is not None and (last.revision, last.exact) == (4, True)
+    assert last is not None and (last.revision, last.moving) == (4, False)
     b.scheduler.presented(1, last.number)
     b.settle()
     tiles = b.finish()
@@ -418,7 +425,7 @@ def test_a_page_that_draws_all_gets_no_picture_until_it_draws_no_more() -> None:
     first = b.step()
     assert first is not None and first.moving
     b.settle()
-    assert b.finish()[-1].final
+    assert b.finish()[-1].last
 
 
 def test_edits_that_were_lost_are_made_again_and_refused_ones_are_not() -> None:
@@ -458,7 +465,7 @@ def test_a_drag_of_cages_alone_needs_no_edits_and_no_pictures() -> None:
     b.settle()
     # A few pixels, which say that this is the picture.
     tiles = b.finish()
-    assert tiles[-1].final and len(pixels(tiles)) < 2000
+    assert tiles[-1].last and len(pixels(tiles)) < 2000
 
 
 def test_a_view_that_was_another_for_a_moment_is_drawn_anew_where_the_page_drew_it() -> None:
@@ -478,3 +485,80 @@ def shown(b: Bench) -> bool:
         b.scheduler.presented(1, request.number)
     b.settle()
     return request is not None
+
+
+def refined(b: Bench) -> list[Refinement]:
+    """Refinements of the pictures that come at rest, once each."""
+    return list(dict.fromkeys(request.refinement for request in b.finish()))
+
+
+def test_a_picture_is_refined_step_by_step_and_a_camera_does_not_begin_anew() -> None:
+    b = Bench(least=Refinement.DRAFT)
+    b.open(1)
+    b.scheduler.edits(1, False, b.now)
+    b.step()
+    b.settle()
+    assert refined(b) == [*Refinement]
+    assert b.scheduler.idle()
+    b.camera(1, 2)
+    b.step()
+    b.settle()
+    # What the edits need is known: light does not come and go as the camera turns.
+    assert refined(b) == [FINAL]
+    b.scheduler.edits(2, False, b.now)
+    b.step()
+    b.settle()
+    assert refined(b) == [*Refinement]
+
+
+def test_refinements_that_change_nothing_are_passed_over() -> None:
+    b = Bench(least=Refinement.INPAINTED)
+    b.open(1)
+    b.scheduler.edits(1, False, b.now)
+    b.step()
+    b.settle()
+    assert refined(b) == [Refinement.INPAINTED, Refinement.EXACT, FINAL]
+
+
+def test_a_gesture_cancels_the_refinement() -> None:
+    b = Bench(least=Refinement.DRAFT)
+    b.open(1)
+    b.scheduler.edits(1, False, b.now)
+    b.step()
+    b.settle()
+    while (request := b.scheduler.next(b.now)) is not None and request.refinement < Refinement.EXACT:
+        assert not isinstance(request, EditsRequest)
+        b.render(request)
+        b.show(1)
+    generation = b.scheduler.generation
+    b.scheduler.edits(2, True, b.now)
+    assert b.scheduler.generation > generation
+    assert request is not None
+    b.scheduler.abandoned(request, again=True)
+    picture = b.step()
+    assert picture is not None and picture.moving and picture.refinement == Refinement.DRAFT
+
+
+@pytest.mark.parametrize("here", ["moving", "all"])
+def test_a_page_that_draws_gets_the_edits_with_each_refinement(here: DrawnHere) -> None:
+    b = Bench(least=Refinement.DRAFT)
+    b.open(1)
+    b.step()
+    b.settle()
+    b.finish()
+    b.scheduler.drawing(1, here, b.now)
+    found: list[tuple[str, Refinement]] = []
+    b.settle()
+    while (request := b.scheduler.next(b.now)) is not None:
+        if isinstance(request, EditsRequest):
+            b.scheduler.sent(request, request.refinement)
+            b.scheduler.presented(1, request.number)
+            found.append(("edits", request.refinement))
+        else:
+            b.render(request)
+            b.show(1)
+            found.append(("picture", request.refinement))
+    edits, pictures = ([r for kind, r in found if kind == which] for which in ("edits", "picture"))
+    assert edits == [*Refinement] and b.scheduler.idle()
+    # The whole picture does not wait for edits that only the next motion needs.
+    assert not pictures if here == "all" else found.index(("picture", FINAL)) < found.index(("edits", FINAL))

@@ -25,6 +25,7 @@ from cagefield.server.editor.session import Session
 from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.render_queue.scheduler import Scheduler
 from cagefield.server.render_queue.splat_extent import splat_extent
+from cagefield.server.render_worker.refinement import FINAL, Refinement
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.splat_density import dense_cells
 from cagefield.server.render_worker.task_handlers import TaskHandlers
@@ -67,8 +68,13 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "ball"
 
 
-def task(*edits: Edit, display: Display = Display(), moving: bool = False, exact: bool = True) -> PictureTask:  # noqa: B008
-    return PictureTask(1, Shown(values_of(edits)), CAMERA, PART, display, moving, exact, 0)
+def task(
+    *edits: Edit,
+    display: Display = Display(),  # noqa: B008  immutable
+    moving: bool = False,
+    refinement: Refinement = FINAL,
+) -> PictureTask:
+    return PictureTask(1, Shown(values_of(edits)), CAMERA, PART, display, moving, refinement, 0)
 
 
 def picture(renderers: RendererCache, asked: PictureTask) -> np.ndarray[Any, Any]:
@@ -83,7 +89,7 @@ def test_pictures_are_those_of_the_scene_at_rest_and_near_them_in_a_drag(
 ) -> None:
     frame = renderers.scene.with_edits(EditStack(edits)).render(CAMERA)
     assert np.array_equal(picture(renderers, task(*edits)), frame.rgb8())
-    quick = picture(renderers, task(*edits, moving=True, exact=False))
+    quick = picture(renderers, task(*edits, moving=True, refinement=Refinement.DRAFT))
     # Long steps of the flow, 1e-4 of the scene: a hundredth of a pixel.
     assert psnr(quick / 255.0, frame.rgb8() / 255.0) > 45
 
@@ -174,7 +180,7 @@ def test_lattices_have_no_error_and_warming_up_is_possible(renderers: RendererCa
 
 
 def test_edits_in_a_drag_keep_their_lattices_and_are_given_up(renderers: RendererCache) -> None:
-    renderer = renderers.renderer(Shown(values_of((MOVED,))), exact=False)
+    renderer = renderers.renderer(Shown(values_of((MOVED,))), Refinement.DRAFT).renderer
     assert renderer.edits[0].edit.lattice == 128
     far = MOVED.translate((0.01, 0, 0))
     assert renderers.picture(task(far), lambda: True) == Stopped(1)
@@ -231,7 +237,7 @@ def test_all_of_a_picture_is_drawn_anew_at_rest() -> None:
             while (request := scheduler.next(now)) is not None:
                 area = request.region.width * request.region.height
                 pixels += 0 if request.moving else area
-                scheduler.finished(request, area, 1e-3, 0.0)
+                scheduler.finished(request, area, 1e-3, 0.0, FINAL)
                 scheduler.presented(1, request.number)
             return pixels
 

@@ -148,7 +148,7 @@ class Patcher:
     def _composite(
         self, below: PreparedStack, edit: Paste, pasted: Pasted, stage: PatchStage, preserve_opacity: bool
     ) -> Pasted:
-        """Content of a paste, composited with the field beneath; below stage LIT alone, unless that is cached."""
+        """Content of a paste, composited with the field beneath; below stage LIT only if cached."""
         assert isinstance(self._field, VoxelField)  # splats need no compositing
         key: Key = (*below.steps, pasted, edit.deformed, preserve_opacity)
         if key not in self._composites:

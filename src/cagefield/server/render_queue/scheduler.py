@@ -84,8 +84,8 @@ class _Page:
     served: float = -math.inf
     draws: DrawnHere = "nothing"
     """Which pictures the page draws itself."""
-    edits: tuple[int, Refinement] | None = None
-    """The revision and the refinement of the edits that the page was sent last."""
+    edits: tuple[int, Refinement, bool] | None = None
+    """Edits that the page was sent last: revision, refinement, and whether they were those of a drag."""
 
 
 class Scheduler:
@@ -218,8 +218,8 @@ class Scheduler:
         page = self._pages.get(request.page)
         if page is not None:
             page.unshown.append(request.number)
-            if page.edits == (request.revision, request.refinement):
-                page.edits = request.revision, attained
+            if page.edits == (request.revision, request.refinement, request.moving):
+                page.edits = request.revision, attained, request.moving
 
     def abandoned(self, request: Request | EditsRequest, again: bool) -> None:
         """The picture was not rendered: stopped or lost, and is wanted `again`, or not possible at all."""
@@ -311,7 +311,9 @@ class Scheduler:
             return False
         if p.edits is None or p.edits[0] != self._revision:
             return True
-        if self._dragging or p.edits[1] == FINAL:
+        if self._dragging or p.edits[2]:
+            return not self._dragging
+        if p.edits[1] == FINAL:
             return False
         return p.draws == "all" or not self._owes_tiles(p)
 
@@ -326,8 +328,8 @@ class Scheduler:
         before = p.edits
         refinement = Refinement.DRAFT
         if before is not None and before[0] == self._revision:
-            refinement = Refinement(before[1] + 1)
-        p.edits = self._revision, refinement
+            refinement = Refinement(min(before[1] + 1, FINAL))
+        p.edits = self._revision, refinement, self._dragging
         # The page draws them over what it shows.
         p.showing.lost()
         self._numbers += 1
