@@ -267,7 +267,7 @@ def test_measuring_a_lattice_is_given_up_and_done_again_later(renderers: Rendere
     session: Any = SimpleNamespace(moving=False, drawn=lambda: (MOVED,))
     measured = []
     background = BackgroundWork(session, Any, lambda: measured.append(1), lambda _: None)  # type: ignore[arg-type]
-    background.warming = []
+    background.warming, background.light_known = [], True
     background_task = background.next(0)
     assert background_task is not None
     background_task.done(stopped)

@@ -8,9 +8,11 @@ from cagefield.server.protocol.common import DrawnHere
 from cagefield.server.render_queue.damage import Differing, everywhere
 from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_queue.scheduler import (
+    MAX_MOVING_SECONDS,
     MAX_TILES,
     MOST_MOVING,
     MOVING_SECONDS,
+    MOVING_WIDTH_PX,
     SETTLE_SECONDS,
     Scheduler,
 )
@@ -119,16 +121,32 @@ def test_the_middle_tile_comes_first() -> None:
 def test_moving_pictures_take_the_time_they_may(rate: float) -> None:
     b = Bench(rate)
     b.open(1)
-    seconds = 0.0
+    seconds, width = 0.0, 0
     for seq in range(2, 60):
         b.camera(1, seq, moving=True)
         began = b.now
-        assert b.step() is not None
-        seconds = b.now - began
+        request = b.step()
+        assert request is not None
+        seconds, width = b.now - began, request.region.full_width
         b.now += 0.002
-    assert seconds <= MOVING_SECONDS * 1.001
-    # A step of SCALES is at most a factor of 0.78 in the side; LEAST_SIDE keeps the smallest above it.
+    # Twice as long where that makes it legible.
+    assert seconds <= (MOVING_SECONDS if width > MOVING_WIDTH_PX else MAX_MOVING_SECONDS) * 1.001
+    # A step of RESOLUTION_SCALES is at most a factor of 0.78 in the side.
     assert seconds >= 0.5 * MOVING_SECONDS
+
+
+@pytest.mark.parametrize(("rate", "legible"), [(5e5, False), (1.7e6, True), (3e6, True), (8e6, True)])
+def test_moving_pictures_are_legible_where_speed_allows_it(rate: float, legible: bool) -> None:
+    b = Bench(rate)
+    b.open(1)
+    width = 0
+    for seq in range(2, 60):
+        b.camera(1, seq, moving=True)
+        request = b.step()
+        assert request is not None
+        width = request.region.full_width
+        b.now += 0.002
+    assert (width >= MOVING_WIDTH_PX) == legible
 
 
 def test_time_that_goes_into_the_map_is_taken_off_the_rays() -> None:

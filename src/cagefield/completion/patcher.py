@@ -75,6 +75,7 @@ class Patcher:
         self._light_block: tuple[Key, GridBlock] | None = None
         self._directional_models: dict[tuple[float, float, float] | None, LightModel] = {}
         self._composites: OrderedDict[Key, Pasted] = OrderedDict()
+        self._images: dict[Key, RenderResult] = {}
 
     def prepare(
         self,
@@ -202,10 +203,18 @@ class Patcher:
 
     @cached_property
     def _visibility(self) -> CameraVisibility:
-        """Visibility of the field's surfaces."""
-        return self._disk_cache.get_or_make(
-            ("sight",), lambda: render_visibility(self._render, self._cameras, self._field.bounds)
+        """Visibility of the field's surfaces; its images are kept where it is cancelled."""
+        visibility = self._disk_cache.get_or_make(
+            ("sight",), lambda: render_visibility(self._image, self._cameras, self._field.bounds)
         )
+        self._images.clear()
+        return visibility
+
+    def _image(self, camera: Camera) -> RenderResult:
+        key = camera.c2w.tobytes(), camera.fx, camera.fy, camera.width, camera.height
+        if key not in self._images:
+            self._images[key] = self._render(camera)
+        return self._images[key]
 
     def _patch(
         self,

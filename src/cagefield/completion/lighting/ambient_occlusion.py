@@ -48,7 +48,7 @@ PRIOR_WEIGHT_DEVIATION = 0.2
 PRIOR_SUM_DEVIATION = 0.15
 """Prior standard deviation of the sum of the weights."""
 
-REPEATS_PER_PAIR = 1000.0
+REPEATS_PER_PAIR = 300.0
 """Number of pairs that count as one observation: neighbors, and other views, show the same texture."""
 
 MIN_OPENNESS = 0.08

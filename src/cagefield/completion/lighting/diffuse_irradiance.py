@@ -25,10 +25,10 @@ from cagefield.completion.surfaces.visibility import CameraVisibility
 from cagefield.compute.cancellation import check_cancelled
 from cagefield.typing import AnyArray, Array
 
-MAX_SURFELS_PER_DISTANCE = 40_000
+MAX_SURFELS_PER_DISTANCE = 16_000
 """Maximum number of surfels sampled per distance."""
 
-MAX_NORMAL_PAIRS = 20_000
+MAX_NORMAL_PAIRS = 8_000
 """Maximum number of pairs for the fit."""
 
 MAX_PAIR_COSINE = 0.97
@@ -50,7 +50,7 @@ MAX_HUE_DIFFERENCE = 0.2
 PRIOR_COMPONENT_DEVIATION = 0.3
 """Prior standard deviation of each component of a, about 0: at 1 a surface that faces away is black."""
 
-REPEATS_PER_NORMAL_PAIR = 30.0
+REPEATS_PER_NORMAL_PAIR = 12.0
 """Number of pairs that count as one observation: neighbors, and other views, show the same texture."""
 
 MIN_RELATIVE_BRIGHTNESS = 0.2

@@ -25,7 +25,7 @@ IMAGE_SIZE_PIXELS = 280
 PAIR_DISTANCE_PIXELS = (4, 84)
 """Minimum and maximum distance of a pair of neighbors, pixels."""
 
-MAX_PAIRS = 40_000
+MAX_PAIRS = 12_000
 """Maximum number of pairs of neighbors."""
 
 MAX_SURFELS = 300_000

@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 MOVING_DETAIL = 1.0
 """Pixels within which splats are drawn as one while something moves (benchmarks/results/splat_speed.md)."""
 
+MIN_MERGED_SPLATS = 500_000
+"""Fewer splats that edits change are drawn one by one: merging them anew takes longer than it saves."""
+
 
 class SplatRenderer:
     """Renders one SplatField under one edit stack, with the same methods as `VoxelRenderer`.
@@ -131,7 +134,8 @@ class SplatRenderer:
         if proceed is not None:
             proceed()
         with self._buffers.lock:
-            detail = 0.0 if step is None else MOVING_DETAIL
+            is_merged = not self.edits.steps or len(self.splats) >= MIN_MERGED_SPLATS
+            detail = MOVING_DETAIL if step is not None and is_merged else 0.0
             seen = self.project(camera, near=near, region=region, normals=normals, detail=detail)
             if proceed is not None:
                 proceed()
@@ -171,6 +175,7 @@ class SplatRenderer:
             if self._arrays is None or (normals and not self._arrays.has_normals):
                 self._arrays = device_rasterizer.SplatArrays(self.splats, self._normals)
             return device_rasterizer.project(self._arrays, camera, near=near, region=region)
+        least = MIN_MERGED_SPLATS if self.edits.steps else MIN_CLUSTERED_SPLATS
         return project(
             self.splats,
             camera,
@@ -178,7 +183,7 @@ class SplatRenderer:
             region=region,
             normals=self._normals if normals else None,
             buffers=self._buffers,
-            clusters=self._clusters() if len(self.splats) >= MIN_CLUSTERED_SPLATS else None,
+            clusters=self._clusters() if len(self.splats) >= least else None,
             detail=0.0 if normals else detail,
         )
 

@@ -1,6 +1,7 @@
 """Background tasks of the rendering process, for times when no page waits for an image.
 
-It makes its kernels ready, then measures the lattices of edits, then renders the pictures of background jobs.
+It makes its kernels ready, then finds the light of the field, which no edit has to wait for then; measures the
+lattices of edits, and renders the pictures of background jobs.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from cagefield.server.render_worker.tasks import (
     EndJobTask,
     ErrorTask,
     Failed,
+    LightTask,
     Result,
     Stopped,
     WarmStage,
@@ -47,6 +49,7 @@ class BackgroundWork:
         self._measured, self._tell = measured, tell
         self._warmed = 0
         self.warming = list(WarmStage)
+        self.light_known = False
         self._errors: IdentityCache[Edit, Errors | None] = IdentityCache(64)
         self._jobs: list[Job] = []
         self._ending: list[tuple[Job, str]] = []
@@ -57,6 +60,8 @@ class BackgroundWork:
         """Next background task, or None; tasks of older generations than `generation` are abandoned."""
         if self.warming:
             return self._warm()
+        if not self.light_known:
+            return BackgroundTask(lambda number: LightTask(number, generation), self._light_done)
         edit = self._unmeasured()
         if edit is not None:
             return self._measure(edit, generation)
@@ -78,6 +83,10 @@ class BackgroundWork:
             self._tell(self.preparing())
 
         return BackgroundTask(lambda number: WarmTask(number, stage), done)
+
+    def _light_done(self, result: Result) -> None:
+        """A field whose light cannot be found says so where an edit needs it."""
+        self.light_known = self.light_known or not isinstance(result, Stopped)
 
     # ---- lattices ----
 

@@ -37,6 +37,9 @@ than it had to be, and would be rendered while the page has the one before to dr
 MOVING_SECONDS = 0.05
 """Time that a picture may take while something moves."""
 
+MOVING_WIDTH_PX, MAX_MOVING_SECONDS = 400, 0.1
+"""Width that it has if that takes at most so long: smaller ones are too blurred to judge an edit by."""
+
 TILE_SECONDS = 0.25
 """Time that a tile may take at rest; each costs the page a frame. Abandoned ones end sooner."""
 
@@ -390,7 +393,12 @@ class Scheduler:
         rays = self._rate * max(MOVING_SECONDS - self._overhead, 0.4 * MOVING_SECONDS)
         _, _, width, height = pixels(rect, p.width, p.height)
         wanted = math.sqrt(rays / (width * height))
+        legible = MOVING_WIDTH_PX / p.width
+        if wanted < legible:
+            wanted = min(legible, wanted * math.sqrt(MAX_MOVING_SECONDS / MOVING_SECONDS))
         least = min(1.0, MIN_SIDE_PX / min(p.width, p.height))
+        if legible <= wanted < RESOLUTION_SCALES[0]:
+            least = max(least, legible)
         return max(next((s for s in RESOLUTION_SCALES if s <= wanted), RESOLUTION_SCALES[-1]), least)
 
     def _cut(self, page: int, refinement: Refinement) -> None:

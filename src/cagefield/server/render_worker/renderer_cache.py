@@ -186,7 +186,12 @@ class RendererCache:
         )
 
     def _step(self, camera: Camera, least: float) -> float:
-        """Sampling distance of a moving image, voxels: the size of a pixel in the middle of the field."""
+        """Sampling distance of a moving image, voxels: the size of a pixel in the middle of the field.
+
+        Of splats, which take no samples, the least one.
+        """
+        if not self._is_sampled:
+            return least
         distance = float(np.linalg.norm(camera.origin - self._middle))
         shown = distance / camera.fx / self.scene.field.sample_spacing
         return min(max(shown, least), MAX_STEP_VOXELS)

@@ -29,6 +29,7 @@ from cagefield.server.render_worker.tasks import (
     FitTask,
     FrameTask,
     GridTask,
+    LightTask,
     LookTask,
     PageEditsTask,
     PageFieldTask,
@@ -67,6 +68,8 @@ class TaskHandlers:
             return self._pages.edits(task, lambda: abandoned(task.generation))
         if isinstance(task, FrameTask):
             return self._frame(task, lambda: abandoned(task.generation))
+        if isinstance(task, LightTask):
+            return self._light(task, lambda: abandoned(task.generation))
         if isinstance(task, ErrorTask):
             return self._error(task, lambda: abandoned(task.generation))
         if isinstance(task, StillTask):
@@ -94,6 +97,13 @@ class TaskHandlers:
         if isinstance(task, PageFieldTask):
             return self._pages.field()
         return grid_lines(task.edit.edit())
+
+    def _light(self, task: LightTask, stop: Callable[[], bool]) -> Result:
+        try:
+            self._renderers.scene.patcher.warm(cancellation_check(stop))
+        except GivenUpError:
+            return Stopped(task.number)
+        return Answered(task.number)
 
     def _error(self, task: ErrorTask, stop: Callable[[], bool]) -> Result:
         """(max, mean) error of an edit's lattice, voxels; none for splats, which take no lattice."""

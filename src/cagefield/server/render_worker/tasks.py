@@ -121,6 +121,14 @@ class WarmTask:
 
 
 @dataclass(frozen=True)
+class LightTask:
+    """The light of the field is to be known before an edit needs it; abandoned with its generation."""
+
+    number: int
+    generation: int
+
+
+@dataclass(frozen=True)
 class ErrorTask:
     """How far an edit's lattice is from its exact map; given up when its generation is over."""
 
@@ -191,6 +199,7 @@ Task: TypeAlias = (
     | FitTask
     | LookTask
     | WarmTask
+    | LightTask
     | ErrorTask
     | GridTask
     | FrameTask
