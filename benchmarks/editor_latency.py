@@ -34,6 +34,7 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.scene.scene import Scene
+from cagefield.server.editor.session import LATTICE
 
 Kind = Literal["continuous", "discrete"]
 
@@ -218,7 +219,7 @@ def cage_file(folder: Path, kind: Kind) -> str:
         "adjustment": kind,
     }
     if kind == "continuous":
-        edit["outer"] = {"margin": (0.25 * extent).tolist()}
+        edit |= {"outer": {"margin": (0.25 * extent).tolist()}, "lattice": LATTICE}
     return json.dumps({"version": 1, "edits": [edit]})
 
 

@@ -32,6 +32,8 @@ export interface Figures {
   encodeMs: number;
   width: number;
   height: number;
+  /** Whether the whole frame is there, and whether nothing refines it. */
+  whole: boolean;
   final: boolean;
   /** Whether the page's own GPU drew the frame. */
   page: boolean;
@@ -98,7 +100,16 @@ export const INITIAL: Editor = {
   upload: null,
   preview: null,
   loading: null,
-  figures: { perSecond: 0, renderMs: 0, encodeMs: 0, width: 0, height: 0, final: false, page: false },
+  figures: {
+    perSecond: 0,
+    renderMs: 0,
+    encodeMs: 0,
+    width: 0,
+    height: 0,
+    whole: false,
+    final: false,
+    page: false,
+  },
 };
 
 export type Listener = (now: Editor, before: Editor) => void;

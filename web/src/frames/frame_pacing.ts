@@ -188,6 +188,7 @@ export class FramePacer {
       encodeMs,
       width: full_width,
       height: full_height,
+      whole,
       final,
       page: header.picture === 0,
     };

@@ -46,7 +46,8 @@ export function status(app: App): HTMLElement {
     } else late ??= setTimeout(() => (preparing.hidden = false), MIN_PREPARATION_MS);
   });
   app.store.watch(["figures", "state", "connection"], ({ figures: f, state, connection: c }) => {
-    const speed = f.perSecond >= 0.5 && !f.final ? `${f.perSecond.toFixed(0)} pictures/s · ` : "";
+    let speed = f.perSecond >= 0.5 && !f.final ? `${f.perSecond.toFixed(0)} pictures/s · ` : "";
+    if (f.whole && !f.final) speed = "Refining · ";
     figures.textContent =
       f.width > 0
         ? `${speed}${f.width}×${f.height} · ${f.renderMs.toFixed(0)} ms · ${f.page ? "drawn here" : "by the server"}`

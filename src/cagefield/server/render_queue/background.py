@@ -1,7 +1,7 @@
 """Background tasks of the rendering process, for times when no page waits for an image.
 
-It makes its kernels ready, then finds the light of the field, which no edit has to wait for then; measures the
-lattices of edits, and renders the pictures of background jobs.
+It makes its kernels ready, then finds the light of the field, for which no edit has to wait then; measures
+the lattices of edits, and renders the pictures of background jobs.
 """
 
 from __future__ import annotations

@@ -1,0 +1,159 @@
+"""Refinements of edited pictures: each nearer to the final one, none awaited by a drag, all cancelled."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cagefield.cameras.camera import Camera
+from cagefield.completion import patch_cache
+from cagefield.completion import patcher as patcher_module
+from cagefield.completion.lighting.ambient_occlusion import LightModel, occlusion_radii
+from cagefield.completion.patcher import PatchStage
+from cagefield.completion.surfaces import visibility
+from cagefield.edits import Edit, EditStack
+from cagefield.geometry.cage import Cage
+from cagefield.scene.scene import Scene
+from cagefield.server.render_worker.cancellation import GivenUpError
+from cagefield.server.render_worker.edited_renderers import attained_refinement
+from cagefield.server.render_worker.refinement import FINAL, Refinement
+from cagefield.server.render_worker.renderer_cache import RendererCache
+from cagefield.server.render_worker.tasks import Shown, values_of
+from scenes import ball_field
+from splat_scenes import splat_scene
+
+CAMERA = Camera.look_at((0, -3, 0.8), (0, 0, 0), width=96, height=96, fov_x=0.6)
+INNER = Cage.box((0.3, 0.0, 0.2), (0.5, 0.7, 0.5))
+BENT = Edit.continuous(INNER, INNER.grown(0.3), lattice=64).rotate((0.0, 0.3, 0.2)).translate((0.1, 0, 0.1))
+MOVED = Edit.move(INNER).translate((0.3, 0.0, 0.4))
+DELETED = Edit.delete(INNER)
+EDITS = {"continuous": BENT, "move": MOVED, "delete": DELETED}
+
+
+@pytest.fixture(params=["voxels", "splats"])
+def cache(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> RendererCache:
+    """A ball whose colors are said to follow its openness; nothing of it is on disk."""
+    monkeypatch.setattr(patch_cache, "cache_root", lambda: tmp_path)
+    monkeypatch.setattr(patch_cache, "MIN_CACHED_SECONDS", math.inf)
+    monkeypatch.setattr(visibility, "CAMERA_COUNT", 8)
+    monkeypatch.setattr(visibility, "IMAGE_SIZE_PIXELS", 120)
+    scene = Scene(ball_field(resolution=49)) if request.param == "voxels" else splat_scene()
+    radii = occlusion_radii(scene.patcher._voxel_field)
+    scene.patcher.__dict__["light_model"] = LightModel(radii, (0.1, 0.2, 0.2, 0.2, 0.2))
+    return RendererCache(scene)
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_each_refinement_is_nearer_to_the_final_picture(cache: RendererCache, name: str) -> None:
+    shown = Shown(values_of((EDITS[name],)))
+    attained, distances = [], []
+    final = cache.scene.with_edits(EditStack([EDITS[name]])).render(CAMERA).rgb
+    for refinement in Refinement:
+        made = cache.renderer(shown, refinement)
+        frame = made.renderer.render(CAMERA, background=cache.scene.background)
+        attained.append(made.refinement)
+        distances.append(float(np.abs(frame.rgb - final).mean()))
+    assert attained == sorted(attained) and attained[-1] == FINAL
+    assert all(made >= asked for made, asked in zip(attained, Refinement, strict=True))
+    # Nothing flickers back: 1e-4 is less than a level of 8 bits in one pixel of forty.
+    assert all(b <= a + 1e-4 for a, b in itertools.pairwise(distances)), distances
+    assert distances[-1] == 0.0
+    if name == "continuous":
+        assert distances[0] > 1e-4
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_a_draft_computes_no_patch(cache: RendererCache, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*args: Any, **kwargs: Any) -> None:
+        raise AssertionError("a drag's picture waits for it")
+
+    names = "build_patch build_splat_patch relight_voxels relight_splats fit_light_model render_visibility"
+    for function in names.split():
+        monkeypatch.setattr(patcher_module, function, refuse)
+    made = cache.renderer(Shown(values_of((EDITS[name],))), Refinement.DRAFT)
+    assert made.refinement < FINAL
+    assert np.isfinite(made.renderer.render(CAMERA, background="white").rgb).all()
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_patches_are_cancelled_from_within_and_made_whole_later(cache: RendererCache, name: str) -> None:
+    patcher, edits = cache.scene.patcher, [EDITS[name]]
+    calls = 0
+
+    def count() -> None:
+        nonlocal calls
+        calls += 1
+
+    patcher.prepare(edits, proceed=count)
+    whole = patcher.prepare(edits)
+    assert calls > 10, "work that cannot be cancelled for long"
+    patcher._cache.clear()
+    patcher._light_block = None
+    patcher.__dict__.pop("_visibility", None)
+    left = calls // 2
+
+    def stop() -> None:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise GivenUpError
+
+    with pytest.raises(GivenUpError):
+        patcher.prepare(edits, proceed=stop)
+    assert patcher.prepare(edits, stage=PatchStage.CACHED)[0].patch is None
+    again = patcher.prepare(edits)
+    for one, other in zip(whole.layers, again.layers, strict=True):
+        np.testing.assert_array_equal(one.density, other.density)
+        np.testing.assert_array_equal(one.sh, other.sh)
+
+
+def test_visibility_keeps_its_images_where_it_is_cancelled(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(patch_cache, "cache_root", lambda: tmp_path)
+    monkeypatch.setattr(visibility, "IMAGE_SIZE_PIXELS", 40)
+    scene = Scene(ball_field(resolution=33))
+    rendered: list[Camera] = []
+    render = scene.patcher._render
+
+    def counted(camera: Camera) -> Any:
+        rendered.append(camera)
+        return render(camera)
+
+    patcher = scene.patcher
+    patcher._render = counted  # type: ignore[method-assign]
+    left = 10
+
+    def stop() -> None:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise GivenUpError
+
+    with pytest.raises(GivenUpError):
+        patcher.warm(stop)
+    assert 0 < len(rendered) < 28
+    patcher.warm()
+    assert len(rendered) == 28 and not patcher._images
+
+
+@pytest.mark.parametrize(
+    ("edit", "attained"),
+    [
+        (BENT, Refinement.INPAINTED),
+        (BENT.replace(relight="none"), Refinement.INPAINTED),
+        (MOVED, Refinement.DRAFT),
+        (MOVED.replace(fill="none", relight="none", feather=0.0), FINAL),
+        (BENT.replace(enabled=False), FINAL),
+    ],
+)
+def test_refinements_that_change_nothing_are_known(edit: Edit, attained: Refinement) -> None:
+    patcher = Scene(ball_field(resolution=33)).patcher
+    assert attained_refinement(Refinement.DRAFT, [edit], patcher) == attained
+    made = FINAL if edit.relight == "none" else Refinement.EXACT
+    assert attained_refinement(Refinement.EXACT, [edit], patcher) == (made if edit.enabled else FINAL)
