@@ -81,6 +81,7 @@ def jobs(tmp_path: Path) -> Jobs:
     told: list[Any] = []
     work = BackgroundWork(session, store, lambda: None, told.append)
     work.warming.clear()
+    work.light_known = True
     renderers = RendererCache(scene)
     return Jobs(tmp_path, work, renderers, TaskHandlers(renderers), told)
 

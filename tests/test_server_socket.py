@@ -420,7 +420,7 @@ def test_a_page_that_plays_the_path_sees_the_edits_as_far_as_they_have_gone(serv
 
         def seen(revision: int) -> tuple[int, np.ndarray[Any, Any]]:
             """A whole picture of a revision from that one on, and where the ball is on it."""
-            last = client.until(lambda m: m["type"] == "picture" and m["final"] and m["revision"] >= revision)
+            last = client.until(lambda m: m["type"] == "picture" and m["whole"] and m["revision"] >= revision)
             return last["revision"], red_at(pixels(client))
 
         revision, whole = seen(state["revision"])
