@@ -67,6 +67,7 @@ def test_the_box_around_an_edit_leaves_the_gap() -> None:
     edit.replace(outer=outer).check()
 
 
+@pytest.mark.nightly  # lattices converge by test_warps_lattice; the ablations' command runs by the last test
 def test_finer_lattices_are_nearer_to_the_exact_map(subject: Subject) -> None:
     result = ablations.resolution(subject, (8, 32))
     names = [row[:2] for row in result.table.rows]

@@ -244,7 +244,7 @@ def test_the_command_measures_rooms_and_folders(room, tmp_path, capsys):
     photo = read_image(room / "images/frame_00001.jpg")
     np.testing.assert_array_equal(shown[:, :90], photo)
     assert "exists already" in refused(capsys, *argv)
-    printed(capsys, *argv, "--overwrite")
+    printed(capsys, *(word for word in argv if word is not room), "--overwrite")
     assert (made / "transforms.json").stat().st_mtime_ns == stamp
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 import sys
 import warnings
 import zipfile
@@ -39,8 +40,13 @@ def data(capture):
 
 
 @pytest.fixture(scope="module")
-def points(data, tmp_path_factory):
-    return starting_points(data, tmp_path_factory.mktemp("cache"))
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture(scope="module")
+def points(data, cache):
+    return starting_points(data, cache)
 
 
 def test_points_lie_on_the_surfaces_that_the_photos_show(data, points):
@@ -112,8 +118,9 @@ def test_poses_off_by_a_little_still_give_points(data):
     assert len(found) > 200 and np.median(distance_to_textures(found.positions)) < 0.05
 
 
-def test_the_cache_serves_the_same_capture_and_no_other(capture, data, tmp_path, monkeypatch):
-    first = starting_points(data, tmp_path)
+def test_the_cache_serves_the_same_capture_and_no_other(data, points, cache, tmp_path, monkeypatch):
+    first = points
+    shutil.copytree(cache, tmp_path, dirs_exist_ok=True)
     (file,) = tmp_path.iterdir()
     asked = []
 

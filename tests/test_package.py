@@ -169,13 +169,60 @@ def test_package_is_typed() -> None:
     assert (Path(cagefield.__file__).parent / "py.typed").is_file()
 
 
-def test_checks_run_what_the_readme_says() -> None:
-    readme = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
-    checks = (ROOT / ".ci" / "run").read_text(encoding="utf-8").replace("step ", "").splitlines()
-    assert "pip install . && cagefield demo" in readme and "pip install ." in checks
+def _installs(text: str) -> list[set[str]]:
+    """The extras of each command in a text that installs the package from its folder."""
+    found = re.findall(r"\bpip install (?:-e )?'?\.(?:\[([\w,]+)\])?'?(?=\s|`|$)", text)
+    return [set(extras.split(",")) - {""} for extras in found]
+
+
+def _with_those_within(extras: set[str]) -> set[str]:
+    """The extras and those that they hold, as `dev = ["cagefield[test]", ...]` does."""
+    held = {name: set[str]() for name in importlib.metadata.metadata("cagefield").get_all("Provides-Extra")}
+    for text in importlib.metadata.requires("cagefield") or []:
+        requirement = Requirement(text)
+        if canonicalize_name(requirement.name) == "cagefield":
+            for name in held:
+                if requirement.marker is not None and requirement.marker.evaluate({"extra": name}):
+                    held[name] |= requirement.extras
+    every = set[str]()
+    pending = list(extras)
+    while pending:
+        name = pending.pop()
+        assert name in held, f"no extra {name}"
+        if name not in every:
+            every.add(name)
+            pending.extend(held[name])
+    return every
+
+
+def test_checks_run_what_the_readme_and_contributing_say() -> None:
+    """Install and test commands of a user, of a contributor and of `.ci/run` agree."""
+    readme, contributing, checks = (
+        (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "CONTRIBUTING.md", ".ci/run")
+    )
+    steps = [line.strip().removeprefix("step ") for line in checks.splitlines()]
     tests = "python -m pytest -n 2 --dist loadfile"
-    assert f"pip install '.[test]' && {tests}" in readme
-    assert "pip install '.[test]'" in checks and checks[-1] == tests
+    assert "pip install . && cagefield demo" in readme.splitlines() and "pip install ." in steps
+    assert f"pip install '.[test]' && {tests}" in readme.splitlines()
+    assert tests in contributing.splitlines() and f"| tests | `{tests}` |" in contributing.splitlines()
+    assert [step for step in steps if "pytest" in step] == [tests] == steps[-1:]
+    # Extras that the pages install are installed by the checks, by name or within another extra.
+    # PyTorch of the extra nerf comes from its CPU build.
+    installed = _with_those_within(set().union(*_installs(checks)))
+    for page in (readme, contributing):
+        extras = _installs(page)
+        assert any("test" in _with_those_within(each) for each in extras)
+        assert set().union(*extras) - {"nerf"} <= installed
+    assert any(step.startswith("pip install 'torch==") for step in steps)
+    # The table of CONTRIBUTING: each tool with these options (mkdocs with some more).
+    table = re.findall(
+        r"^\| [^|]+ \| `([^`]+)`(?:, in `web/`)? \|$", contributing[: contributing.index("| tier |")], re.M
+    )
+    commands = [command for row in table for command in row.split(" && ")]
+    assert len(commands) >= 10
+    for command in commands:
+        if not command.startswith("pip install"):
+            assert any(step == command or step.startswith(f"{command} ") for step in steps), command
 
 
 def test_workflow_runs_the_checks_of_the_repository() -> None:

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 import pytest
 from benchmarks.edits.baselines import PEERS, HarmonicShell
-from benchmarks.edits.baselines.harmonic import RESOLUTION, conjugate_gradients
+from benchmarks.edits.baselines.harmonic import conjugate_gradients
 from benchmarks.edits.baselines.mean_value import ClosedMesh, cube_surface
 from benchmarks.edits.distortion import distortion, shell_points
 from benchmarks.edits.methods import MAPS, METHODS, Peer, check_known, exact_map
@@ -28,11 +28,15 @@ EDIT = Edit.continuous(INNER, OUTER)
 MOVED = EDIT.translate((0.1, 0.05, -0.05))
 TURNED = EDIT.rotate((0.1, 0.2, 0.5)).scale((1.2, 0.9, 1.1))
 BENT = EDIT.move_corner(7, (0.2, 0.1, 0.15)).move_edge((0, 1), (0.0, -0.1, 0.05))
+NODES = 33
+"""Nodes of the harmonic map's grid along each axis: half of the usual ones, 0.05 apart."""
 
 
 @cache
 def shell(name: str, edit: Edit) -> Callable[[Array], tuple[Array, Array]]:
     assert edit.outer is not None
+    if name == "harmonic":
+        return HarmonicShell(HexahedronMap(edit.inner, edit.deformed), edit.outer, NODES).to_canonical
     return PEERS[name](edit.inner, edit.deformed, edit.outer).to_canonical
 
 
@@ -136,7 +140,7 @@ def test_jacobians_by_finite_differences(name: str, edit: Edit) -> None:
     p = shell_points(edit, 300)
     step = 1e-6
     if name == "harmonic":  # linear along each axis within a cell of the grid: away from its faces, exact
-        nodes = (p + 0.8) / 1.6 * 64
+        nodes = (p + 0.8) / 1.6 * (NODES - 1)
         p = p[(np.abs(nodes - np.round(nodes)) > 1e-3).all(axis=1)]
     J = to_canonical(p)[1]
     # second order in the step, rounding 1e-16 / 1e-6 of values whose third derivative is up to 1e3 near edges
@@ -158,8 +162,8 @@ def test_shells_are_the_identity_outside_and_phi_inside(name: str, edit: Edit) -
     inside = hexahedron.points(edit.deformed.corners, u)
     error = np.linalg.norm(to_canonical(inside)[0] - canonical, axis=1)
     on_edge = (np.abs(u - 0.5) > 0.4).sum(axis=1) > 1
-    if name == "harmonic":  # a fifth of the spacing of 0.025; more at edges, where slopes are not bounded
-        assert error.mean() < 0.0025 and error[~on_edge].max() < 0.005
+    if name == "harmonic":  # an eighth of the spacing of 0.05; more at edges, where slopes are not bounded
+        assert error.mean() < 0.00625 and error[~on_edge].max() < 0.01
     elif edit is TURNED:
         assert error.max() < 5e-6
     else:  # bilinear faces as 9 pairs of triangles: a bend of 0.3 / 4 / 9
@@ -201,8 +205,8 @@ def test_harmonic_displacement_around_a_ball() -> None:
     for middle in ([0.6, 0.1, 0.0], [-0.3, 0.6, 0.1], [-0.55, -0.5, 0.5]):
         p = np.array(middle) + ball
         at = to_canonical(np.array([middle]))[0] - middle
-        # the seven-point scheme and the trilinear interpolation are of second order: (1/40)^2 of 0.1 or so
-        np.testing.assert_allclose((to_canonical(p)[0] - p).mean(axis=0), at[0], atol=4e-4)
+        # the seven-point scheme and the trilinear interpolation are of second order: (1/20)^2 of 0.1 or so
+        np.testing.assert_allclose((to_canonical(p)[0] - p).mean(axis=0), at[0], atol=1e-3)
         # the maximum principle, with respect to the cages' displacements
         moved = to_canonical(p)[0] - p
         low, high = np.array([[-0.1, -0.05, 0.0], [0.0, 0.0, 0.05]])
@@ -212,9 +216,7 @@ def test_harmonic_displacement_around_a_ball() -> None:
 def test_harmonic_converges_with_its_grid() -> None:
     p = shell_points(TURNED, 2000)
     phi = HexahedronMap(TURNED.inner, TURNED.deformed)
-    assert RESOLUTION == 65
-    maps = [HarmonicShell(phi, OUTER, n).to_canonical(p)[0] for n in (17, 33)]
-    maps.append(shell("harmonic", TURNED)(p)[0])
+    maps = [HarmonicShell(phi, OUTER, n).to_canonical(p)[0] for n in (9, 17, 33)]
     coarse, fine = (np.linalg.norm(maps[i] - maps[i + 1], axis=1).mean() for i in range(2))
     assert coarse / fine > 1.6  # second order would be 4; slopes are not bounded at the inner cage's edges
 
@@ -226,7 +228,8 @@ def test_harmonic_grid_lies_along_a_turned_outer_cage() -> None:
     cages = [Cage(b + cage.corners @ A.T) for cage in (INNER, MOVED.deformed, OUTER)]
     p = shell_points(MOVED, 300)
     # The same grid, turned: equal but for its solver's tolerance.
-    turned = HarmonicShell.from_cages(*cages).to_canonical(b + p @ A.T)[0]
+    inner, deformed, outer = cages
+    turned = HarmonicShell(HexahedronMap(inner, deformed), outer, NODES).to_canonical(b + p @ A.T)[0]
     np.testing.assert_allclose(turned, b + shell("harmonic", MOVED)(p)[0] @ A.T, atol=1e-5)
 
 
@@ -250,7 +253,7 @@ def test_an_edit_takes_a_peer_by_name(name: str) -> None:
     in_shell = OUTER.contains(p) & ~TURNED.deformed.contains(p)
     np.testing.assert_array_equal(mapped.points[~in_shell], exact.points[~in_shell])
     np.testing.assert_array_equal(mapped.jacobian[~in_shell], exact.jacobian[~in_shell])
-    expected = shell(name, TURNED)(p[in_shell])
+    expected = PEERS[name](TURNED.inner, TURNED.deformed, OUTER).to_canonical(p[in_shell])
     np.testing.assert_array_equal(mapped.points[in_shell], expected[0])
     np.testing.assert_array_equal(mapped.jacobian[in_shell], expected[1])
 

@@ -65,7 +65,8 @@ def cache_folder(name: str, within: str = "") -> Path | None:
     place: str | Path = "~/.cache/cagefield/kernels"
     try:
         place = cache_root() / "kernels"
-        folder = place / name
+        # Quadrants writes at the end of the process, when a symbolic link may be gone.
+        folder = place.resolve() / name
         (folder / within).mkdir(parents=True, exist_ok=True)
         os.utime(folder)
         if not all(map(_is_usable, (folder, *folder.rglob("*")))):
