@@ -81,7 +81,7 @@ class EditedRenderers:
             ready = {id(edit) for each in exact for edit in each}
             shown = [edit if id(edit) in ready else self._quickly(edit) for edit in shown]
         stack = self._patcher.prepare(
-            shown, stage=STAGES[refinement], preserve_opacity=preserve_opacity, proceed=proceed
+            shown, stage=PATCH_STAGES[refinement], preserve_opacity=preserve_opacity, proceed=proceed
         )
         # Occupancy under edits that both share is kept.
         alike = [kept for kept in self._kept if kept.refinement.is_coarse == refinement.is_coarse]
@@ -107,7 +107,7 @@ class EditedRenderers:
         return self._coarse.put(edit, edit.replace(lattice=QUICK_LATTICE))
 
 
-STAGES = {
+PATCH_STAGES = {
     Refinement.DRAFT: PatchStage.CACHED,
     Refinement.INPAINTED: PatchStage.INPAINTED,
     Refinement.EXACT: PatchStage.INPAINTED,

@@ -21,7 +21,7 @@ from cagefield.rendering.voxels.occupancy import Occupancy
 from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.render_worker.cancellation import GivenUpError, Stop, cancellation_check
-from cagefield.server.render_worker.edited_renderers import STAGES, EditedRenderers, attained_refinement
+from cagefield.server.render_worker.edited_renderers import PATCH_STAGES, EditedRenderers, attained_refinement
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.tasks import EditsDone, PageEditsTask, Stopped
 
@@ -95,7 +95,7 @@ class PageFiles:
         began, proceed = time.perf_counter(), cancellation_check(stop)
         try:
             patcher = self._renderers.scene.patcher
-            edits = patcher.prepare(shown, stage=STAGES[task.refinement], proceed=proceed)
+            edits = patcher.prepare(shown, stage=PATCH_STAGES[task.refinement], proceed=proceed)
             is_coarse = task.refinement.is_coarse
             changed = changed_splats(
                 splats,
