@@ -149,10 +149,38 @@ def test_moving_pictures_are_legible_where_speed_allows_it(rate: float, legible:
     assert (width >= MOVING_WIDTH_PX) == legible
 
 
+def test_fixed_costs_make_no_picture_small_and_no_view_many_tiles() -> None:
+    """Splats: a tenth of a second before the first pixel, then 5 million pixels a second."""
+    b = Bench(5e6)
+
+    def slow(request: Request, overhead: float = 0.0) -> None:
+        rays = request.region.width * request.region.height
+        b.scheduler.finished(request, rays, rays / b.rate + 0.1, 0.0, FINAL)
+        b.now += rays / b.rate + 0.1
+        b.sent.append(request)
+
+    b.render = slow  # type: ignore[method-assign]
+    b.open(1)
+    b.step()
+    b.settle()
+    b.finish()
+    width = 0
+    for seq in range(2, 40):
+        b.camera(1, seq, moving=True)
+        request = b.step()
+        assert request is not None
+        width = request.region.full_width
+    assert width >= 250  # 0.4 of MOVING_SECONDS buys 316 pixels, less a step of RESOLUTION_SCALES
+    b.camera(1, 99)
+    b.step()
+    b.settle()
+    assert len(b.finish()) <= 2
+
+
 def test_time_that_goes_into_the_map_is_taken_off_the_rays() -> None:
     sides = []
     for overhead in (0.0, 0.03):
-        b = Bench()
+        b = Bench(1e7)
         b.open(1)
         for seq in range(2, 40):
             b.camera(1, seq, moving=True)

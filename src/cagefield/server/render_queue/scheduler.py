@@ -26,6 +26,7 @@ from cagefield.server.render_queue.damage import (
     tiles,
     union,
 )
+from cagefield.server.render_queue.frame_cost import FrameCost
 from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_worker.refinement import FINAL, Refinement
 from cagefield.server.render_worker.view import Display, Region
@@ -54,9 +55,6 @@ MIN_SIDE_PX = 80
 
 RESOLUTION_SCALES = (1.0, 0.8, 0.65, 0.5, 0.4, 0.32, 0.25, 0.2, 0.16, 0.125)
 """Resolutions of moving pictures as shares of the full one: a few, since each has its own ray directions."""
-
-FIRST_RATE = 4e5
-"""Rays a second before any was measured."""
 
 
 @dataclass
@@ -103,7 +101,7 @@ class Scheduler:
         self.whole_at_rest = whole_at_rest
         self._pages: dict[int, _Page] = {}
         self._numbers = 0
-        self._rate = FIRST_RATE
+        self._cost = FrameCost()
         self._overhead = 0.0
         self._dragging = False
         self._revision = 0
@@ -193,7 +191,7 @@ class Scheduler:
         whole = (region.width, region.height) == (region.full_width, region.full_height)
         if whole or request.moving:
             # A tile may be empty, and says nothing of how long the whole picture takes.
-            self._rate += 0.3 * (rays / max(seconds - overhead, 1e-4) - self._rate)
+            self._cost.add(rays, seconds - overhead)
         if request.moving:
             self._overhead += 0.5 * (min(overhead, MOVING_SECONDS) - self._overhead)
         page = self._pages.get(request.page)
@@ -390,12 +388,14 @@ class Scheduler:
         )
 
     def _scale(self, p: _Page, rect: Rect | None) -> float:
-        rays = self._rate * max(MOVING_SECONDS - self._overhead, 0.4 * MOVING_SECONDS)
         _, _, width, height = pixels(rect, p.width, p.height)
-        wanted = math.sqrt(rays / (width * height))
+        wanted, longest = (
+            math.sqrt(self._cost.rays(seconds - self._overhead, 0.4 * MOVING_SECONDS) / (width * height))
+            for seconds in (MOVING_SECONDS, MAX_MOVING_SECONDS)
+        )
         legible = MOVING_WIDTH_PX / p.width
         if wanted < legible:
-            wanted = min(legible, wanted * math.sqrt(MAX_MOVING_SECONDS / MOVING_SECONDS))
+            wanted = min(legible, longest)
         least = min(1.0, MIN_SIDE_PX / min(p.width, p.height))
         if legible <= wanted < RESOLUTION_SCALES[0]:
             least = max(least, legible)
@@ -414,6 +414,8 @@ class Scheduler:
             rect = union(rect, p.showing.coarse)
         part = pixels(rect, p.width, p.height)
         p.whole = part == (0, 0, p.width, p.height)
-        count = min(max(1.0, part[2] * part[3] / (self._rate * TILE_SECONDS)), MAX_TILES)
+        count = min(
+            max(1.0, part[2] * part[3] / self._cost.rays(TILE_SECONDS, 0.4 * TILE_SECONDS)), MAX_TILES
+        )
         p.tiles = [Region(*tile, p.width, p.height) for tile in tiles(part, count)]
         p.refinement, p.attained = refinement, FINAL
