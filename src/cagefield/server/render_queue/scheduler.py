@@ -82,6 +82,8 @@ class _Page:
     """Refinement of those tiles."""
     attained: Refinement = FINAL
     """Refinement that all of those tiles have that were rendered."""
+    tiles_spent: tuple[int, int, float] = (0, 0, 0.0)
+    """Those of them that were rendered, their rays and seconds."""
     served: float = -math.inf
     draws: DrawnHere = "nothing"
     """Which pictures the page draws itself."""
@@ -189,8 +191,7 @@ class Scheduler:
             self._known = max(self._known, attained)
         region = request.region
         whole = (region.width, region.height) == (region.full_width, region.full_height)
-        if whole or request.moving:
-            # A tile may be empty, and says nothing of how long the whole picture takes.
+        if request.moving:
             self._cost.add(rays, seconds - overhead)
         if request.moving:
             self._overhead += 0.5 * (min(overhead, MOVING_SECONDS) - self._overhead)
@@ -199,6 +200,12 @@ class Scheduler:
             page.unshown.append(request.number)
             if running is not None and page.version == running[1] and not request.moving:
                 page.attained = min(page.attained, attained)
+                count, sum_rays, sum_seconds = page.tiles_spent
+                page.tiles_spent = count + 1, sum_rays + rays, sum_seconds + seconds - overhead
+                if request.last and page.whole:
+                    # A single tile may be empty, and says nothing of how long the whole picture takes.
+                    count, sum_rays, sum_seconds = page.tiles_spent
+                    self._cost.add(sum_rays, sum_seconds, count)
             page.showing.drawn(
                 (request.camera, request.display),
                 request.revision,
@@ -418,4 +425,4 @@ class Scheduler:
             max(1.0, part[2] * part[3] / self._cost.rays(TILE_SECONDS, 0.4 * TILE_SECONDS)), MAX_TILES
         )
         p.tiles = [Region(*tile, p.width, p.height) for tile in tiles(part, count)]
-        p.refinement, p.attained = refinement, FINAL
+        p.refinement, p.attained, p.tiles_spent = refinement, FINAL, (0, 0, 0.0)
