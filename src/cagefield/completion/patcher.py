@@ -21,7 +21,12 @@ from cagefield.completion.lighting.ambient_occlusion import (
 from cagefield.completion.pasting.paste_composite import composite_paste
 from cagefield.completion.pasting.paste_loader import PasteLoader
 from cagefield.completion.patch_cache import DiskCache
-from cagefield.completion.splat_patch import build_splat_patch, relight_splats
+from cagefield.completion.splat_patch import (
+    SplatBlock,
+    build_splat_patch,
+    extract_splat_block,
+    relight_splats,
+)
 from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.splat_voxelization import voxelize_bounds
 from cagefield.completion.surfaces.visibility import CameraVisibility, render_visibility
@@ -72,7 +77,7 @@ class Patcher:
         self._cameras, self._render, self._pastes = cameras, render, pastes
         self._disk_cache = DiskCache(self._field, cameras)
         self._cache: OrderedDict[Key, Patch | SplatPatch | PreparedEdit | None] = OrderedDict()
-        self._light_block: tuple[Key, GridBlock] | None = None
+        self._light_block: tuple[Key, GridBlock | SplatBlock] | None = None
         self._directional_models: dict[tuple[float, float, float] | None, LightModel] = {}
         self._composites: OrderedDict[Key, Pasted] = OrderedDict()
         self._images: dict[Key, RenderResult] = {}
@@ -292,16 +297,20 @@ class Patcher:
             return cast("PreparedEdit | None", self._cache[key])
 
         def make() -> Patch | SplatPatch | None:
+            # The block below a cage stays the same over many drags of the cage.
+            block_key: Key = (*below.steps, edit.outer, model)
+            known = self._light_block[1] if self._light_block and self._light_block[0] == block_key else None
+            light: PreparedEdit | None
             if isinstance(self._content, VoxelField):
-                # The block below a cage stays the same over many drags of the cage.
-                block_key: Key = (*below.steps, edit.outer, model)
-                if self._light_block is None or self._light_block[0] != block_key:
-                    self._light_block = block_key, extract_bent_block(self._content, below, edit, model)
-                light = relight_voxels(
-                    self._content, below, edit, model, self._light_block[1], self._visibility
-                )
+                block = known if isinstance(known, GridBlock) else None
+                block = block or extract_bent_block(self._content, below, edit, model)
+                light = relight_voxels(self._content, below, edit, model, block, self._visibility)
+                self._light_block = block_key, block
             else:
-                light = relight_splats(self._content, below, edit, model, self._visibility)
+                around = known if isinstance(known, SplatBlock) else None
+                around = around or extract_splat_block(self._content, below, edit, model)
+                light = relight_splats(self._content, below, edit, model, self._visibility, around)
+                self._light_block = block_key, around
             return None if light is None else light.patch
 
         patch = self._disk_cache.get_or_make(("light", model, *below.steps, edit), make)

@@ -8,6 +8,8 @@ inpainted surfaces get new splats (`completion.inpainting.splat_inpainting`).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -109,14 +111,23 @@ def build_splat_patch(
     return known.build_patch(splats.scene, result.context.region, is_new & ~result.inside, light, part, new)
 
 
-def relight_splats(
-    splats: SplatField | SplatSet,
-    below: EditMap,
-    edit: Continuous,
-    model: LightModel,
-    visibility: CameraVisibility | None = None,
-) -> PreparedEdit:
-    """Edit that changes the light of splats under a continuous edit (`completion.continuous_relighting`)."""
+@dataclass(frozen=True, eq=False)
+class SplatBlock:
+    """Splats of a box [2,3], as the edits below place them, and the `block` of their density.
+
+    `known` are those splats with their colors, `scene` the field that patches name their sources in.
+    """
+
+    box: Array
+    block: GridBlock
+    known: KnownSplats
+    scene: SplatField
+
+
+def extract_splat_block(
+    splats: SplatField | SplatSet, below: EditMap, edit: Continuous, model: LightModel
+) -> SplatBlock:
+    """Block of splats in which a continuous edit changes light, wherever the edit takes its content."""
     splats = SplatSet.from_field(splats).with_pastes(below)
     field = splats.field
     box = light_box(edit, 0.0, model.max_radius, model.shadow_directions)
@@ -124,11 +135,28 @@ def relight_splats(
     placed = where_they_are(field, moved)
     voxel = choose_voxel_size(placed, box)
     box = light_box(edit, voxel, model.max_radius, model.shadow_directions)
-    region, grid = Cage.box(box.mean(axis=0), box[1] - box[0]), voxelize_splats(placed, box, voxel)
-    block = extract_block(grid, EditStack(), box)
+    grid = voxelize_splats(placed, box, voxel)
+    known = KnownSplats.from_moved(field, placed, grid, moved)
+    return SplatBlock(box, extract_block(grid, EditStack(), box), known, splats.scene)
+
+
+def relight_splats(
+    splats: SplatField | SplatSet,
+    below: EditMap,
+    edit: Continuous,
+    model: LightModel,
+    visibility: CameraVisibility | None = None,
+    around: SplatBlock | None = None,
+) -> PreparedEdit:
+    """Edit that changes the light of splats under a continuous edit (`completion.continuous_relighting`).
+
+    `around` is its `extract_splat_block`, if that is known.
+    """
+    around = around or extract_splat_block(splats, below, edit, model)
+    block, known = around.block, around.known
+    region = Cage.box(around.box.mean(axis=0), around.box[1] - around.box[0])
     bent = compute_bent_light(block, edit, model)
     relit, light = apply_bent_light(block, bent)
-    known = KnownSplats.from_moved(field, placed, grid, moved)
     new, is_new = NO_SPLATS, np.zeros(block.shape, bool)
     if edit.fill == "surroundings":
         under, support = inpaint_shaded_support(
@@ -138,7 +166,7 @@ def relight_splats(
             is_new = under.changed_from(relit, MIN_FILL_DIFFERENCE)
             new = known.fill_surface(under, is_new, region, edit.inner, support)
     return light_edit(
-        edit, known.build_patch(splats.scene, region, is_new, _to_new_light(block, light), None, new)
+        edit, known.build_patch(around.scene, region, is_new, _to_new_light(block, light), None, new)
     )
 
 
