@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.cameras.keyframe_files import dump_path
 from cagefield.cameras.keyframes import Keyframe, Timeline
-from cagefield.completion.patcher import Patcher
+from cagefield.completion.patcher import Patcher, PatchStage
 from cagefield.edits import Continuous, Edit, EditStack, Move, PreparedEdit, PreparedStack
 from cagefield.edits.partial_edit import partial_edit
 from cagefield.edits.patch import Patch
@@ -196,11 +196,11 @@ class _Patches:
         self,
         edits: Sequence[Edit],
         *,
-        moving: bool = False,
+        stage: PatchStage = PatchStage.LIT,
         relight_continuous: bool = True,
         preserve_opacity: bool = True,
     ) -> PreparedStack:
-        patch = self.moving if moving else self.settled
+        patch = self.settled if stage is PatchStage.LIT else self.moving
         return PreparedStack(
             PreparedEdit(edit, None if isinstance(edit, Continuous) else patch) for edit in edits
         )

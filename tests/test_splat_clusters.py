@@ -171,6 +171,10 @@ def test_a_renderer_uses_them_with_edits_too(monkeypatch: pytest.MonkeyPatch) ->
     want = [SplatRenderer(field, stack).render(view) for stack in stacks]
     monkeypatch.setattr(splat_renderer, "MIN_CLUSTERED_SPLATS", 1000)
     renderer = SplatRenderer(field)
+    # Few edited splats are drawn one by one, while something moves, too.
+    few = renderer.with_edits(stacks[1])
+    np.testing.assert_array_equal(few.render(view, step=1.0).rgb, few.render(view).rgb)
+    monkeypatch.setattr(splat_renderer, "MIN_MERGED_SPLATS", 1000)
     for stack, expected in zip(stacks, want, strict=True):
         edited = renderer.with_edits(stack)
         got, moving = edited.render(view), edited.render(view, step=1.0)
