@@ -34,6 +34,7 @@ from cagefield.server.render_worker.tasks import (
     ErrorTask,
     FitTask,
     FrameTask,
+    LightTask,
     PictureDone,
     PictureTask,
     Shown,
@@ -275,6 +276,20 @@ def test_measuring_a_lattice_is_given_up_and_done_again_later(renderers: Rendere
     assert again is not None and again.make(2) == replace(task, number=2, generation=1)
     again.done(Answered(2, (0.5, 0.1)))
     assert measured == [1] and background.next(2) is None
+
+
+def test_light_is_found_once_a_cage_needs_it_and_again_where_it_was_cancelled() -> None:
+    edits: tuple[Edit, ...] = (MOVED.replace(relight="none"),)
+    session: Any = SimpleNamespace(moving=True, drawn=lambda: edits)
+    background = BackgroundWork(session, Any, lambda: None, lambda _: None)  # type: ignore[arg-type]
+    background.warming = []
+    assert background.next(0) is None
+    edits = (MOVED,)
+    for result in (Stopped(1), Answered(1)):
+        light = background.next(3)
+        assert light is not None and light.make(1) == LightTask(1, 3)
+        light.done(result)
+    assert background.next(3) is None
 
 
 def test_jobs_write_pictures_and_a_video_that_is_there_when_it_is_whole(

@@ -1,7 +1,7 @@
 """Background tasks of the rendering process, for times when no page waits for an image.
 
-It makes its kernels ready, then finds the light of the field, for which no edit has to wait then; measures
-the lattices of edits, and renders the pictures of background jobs.
+It makes its kernels ready, then finds the light of the field as soon as there is a cage, so that no edit waits
+for it; measures the lattices of edits, and renders the pictures of background jobs.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class BackgroundWork:
         """Next background task, or None; tasks of older generations than `generation` are abandoned."""
         if self.warming:
             return self._warm()
-        if not self.light_known:
+        if not self.light_known and any(edit.relight != "none" for edit in self._session.drawn()):
             return BackgroundTask(lambda number: LightTask(number, generation), self._light_done)
         edit = self._unmeasured()
         if edit is not None:
