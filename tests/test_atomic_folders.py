@@ -89,7 +89,7 @@ _KILLED = textwrap.dedent("""
             counted(os, name)
         return main(["edit", "out", edits, "--overwrite"])
 
-    # What the command imports at first use is imported here, not by each child.
+    # Imports of the command at first use are made here, not by each child.
     shutil.copytree(source, "../first")
     assert main(["edit", "../first", edits, "-o", "../edited"]) == 0
     for point in range(200):

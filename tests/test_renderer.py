@@ -151,7 +151,7 @@ EDITS = {
 
 
 FEWER_PIXELS = CAMERA.resized(26, 21)
-"""The same view for edited fields, whose plain pictures take seconds."""
+"""A smaller view for edited fields, whose plain pictures take seconds."""
 
 
 @cache

@@ -27,10 +27,14 @@ class Bench:
     """A scheduler with a renderer of RATE rays a second, and pages that show pictures when told to."""
 
     def __init__(
-        self, rate: float = RATE, differing: Differing = everywhere, least: Refinement = FINAL
+        self,
+        rate: float = RATE,
+        differing: Differing = everywhere,
+        least: Refinement = FINAL,
+        fixed: float = 0.0,
     ) -> None:
-        """`least`: refinement that a draft has already, as where nothing refines it."""
-        self.least = least
+        """`least`: refinement of a draft, as where nothing refines it; `fixed`: seconds before the rays."""
+        self.least, self.fixed = least, fixed
         self.scheduler = Scheduler(differing)
         self.now = 0.0
         self.rate = rate
@@ -45,7 +49,7 @@ class Bench:
 
     def render(self, request: Request, overhead: float = 0.0) -> None:
         rays = request.region.width * request.region.height
-        seconds = rays / self.rate + overhead
+        seconds = self.fixed + rays / self.rate + overhead
         self.now += seconds
         self.scheduler.finished(request, rays, seconds, overhead, max(self.least, request.refinement))
         self.sent.append(request)
@@ -63,6 +67,17 @@ class Bench:
             self.render(request, overhead)
             self.show(request.page)
         return request
+
+    def turn(self, seqs: range) -> int:
+        """Width of the last picture while the camera of page 1 moves."""
+        width = 0
+        for seq in seqs:
+            self.camera(1, seq, moving=True)
+            request = self.step()
+            assert request is not None
+            width = request.region.full_width
+            self.now += 0.002
+        return width
 
     def edits(self) -> EditsRequest | None:
         """Makes the edits that are owed, if any are, and leaves them unshown."""
@@ -139,38 +154,19 @@ def test_moving_pictures_take_the_time_they_may(rate: float) -> None:
 def test_moving_pictures_are_legible_where_speed_allows_it(rate: float, legible: bool) -> None:
     b = Bench(rate)
     b.open(1)
-    width = 0
-    for seq in range(2, 60):
-        b.camera(1, seq, moving=True)
-        request = b.step()
-        assert request is not None
-        width = request.region.full_width
-        b.now += 0.002
-    assert (width >= MOVING_WIDTH_PX) == legible
+    assert (b.turn(range(2, 60)) >= MOVING_WIDTH_PX) == legible
 
 
 def test_fixed_costs_make_no_picture_small_and_no_view_many_tiles() -> None:
     """Splats: a tenth of a second before the first pixel, then 5 million pixels a second."""
-    b = Bench(5e6)
-
-    def slow(request: Request, overhead: float = 0.0) -> None:
-        rays = request.region.width * request.region.height
-        b.scheduler.finished(request, rays, rays / b.rate + 0.1, 0.0, FINAL)
-        b.now += rays / b.rate + 0.1
-        b.sent.append(request)
-
-    b.render = slow  # type: ignore[method-assign]
+    b = Bench(5e6, fixed=0.1)
     b.open(1)
     b.step()
     b.settle()
     b.finish()
-    width = 0
-    for seq in range(2, 40):
-        b.camera(1, seq, moving=True)
-        request = b.step()
-        assert request is not None
-        width = request.region.full_width
-    assert width >= 250  # 0.4 of MOVING_SECONDS buys 316 pixels, less a step of RESOLUTION_SCALES
+    assert (
+        b.turn(range(2, 40)) >= 250
+    )  # 0.4 of MOVING_SECONDS buys 316 pixels, less a step of RESOLUTION_SCALES
     b.camera(1, 99)
     b.step()
     b.settle()
@@ -549,7 +545,7 @@ def test_a_picture_is_refined_step_by_step_and_a_camera_does_not_begin_anew() ->
     b.camera(1, 2)
     b.step()
     b.settle()
-    # What the edits need is known: light does not come and go as the camera turns.
+    # Light is known, and does not come and go as the camera turns.
     assert refined(b) == [FINAL]
     b.scheduler.edits(2, False, b.now)
     b.step()

@@ -83,7 +83,7 @@ class _Page:
     attained: Refinement = FINAL
     """Refinement that all of those tiles have that were rendered."""
     tiles_spent: tuple[int, int, float] = (0, 0, 0.0)
-    """Those of them that were rendered, their rays and seconds."""
+    """Number, rays and seconds of the tiles that were rendered."""
     served: float = -math.inf
     draws: DrawnHere = "nothing"
     """Which pictures the page draws itself."""
