@@ -17,7 +17,12 @@ from cagefield.rendering.voxels.device_grid import to_device  # noqa: E402
 from cagefield.rendering.voxels.kernels.grid import ivec3  # noqa: E402
 from cagefield.training.voxels.grid_state import GridState, cell_sizes  # noqa: E402
 from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS  # noqa: E402
-from cagefield.training.voxels.kernels.gauss_newton_voxels import StepArgs, gauss_newton, laplacian  # noqa: E402
+from cagefield.training.voxels.kernels.gauss_newton_voxels import (  # noqa: E402
+    StepArgs,
+    gauss_newton,
+    laplacian,
+    reduce_workers,
+)
 from cagefield.training.voxels.kernels.ray_batches import PatchArgs  # noqa: E402
 from cagefield.training.voxels.kernels.training_march import (  # noqa: E402
     MAX_SAMPLES,
@@ -183,12 +188,30 @@ def test_workers_only_split_the_sum(tmp_path):
         )
 
 
-def test_gauss_newton_step_is_gradient_over_damped_curvature(tmp_path):
-    data, grid = photos(tmp_path), state(1, False)
-    march(grid, data, np.ones((3, 3)))
-    records = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, -1).sum(axis=0).astype(np.float64)
-    before_density, before_sh, _, _ = grid.arrays()
-    h = grid.cell.to_numpy()[1:].astype(np.float64)
+def reduced(grid: GridState) -> None:
+    """Adds the accumulators of all workers up in the first one's."""
+    reduce_workers(grid.accumulator, grid.record, grid.workers, grid.slots, grid.terms)
+
+
+def smoothed(grid: GridState) -> None:
+    """Adds the Laplacian's gradient to the first worker's accumulator."""
+    laplacian(
+        grid.density,
+        grid.sh,
+        grid.index,
+        grid.vertex_at,
+        grid.cell,
+        grid.accumulator,
+        grid.slots,
+        ivec3(N, N, N),
+        0.3,
+        0.2,
+        grid.terms,
+    )
+
+
+def stepped(grid: GridState) -> None:
+    """Takes a Gauss-Newton step."""
     gauss_newton(
         grid.density,
         grid.sh,
@@ -196,12 +219,36 @@ def test_gauss_newton_step_is_gradient_over_damped_curvature(tmp_path):
         grid.weight,
         grid.cell,
         grid.accumulator,
-        grid.record,
-        grid.workers,
         grid.slots,
         StepArgs(0.9, 0.5, 0.25, 0.3, 0.01, 0.05),
         grid.terms,
     )
+
+
+def test_a_batch_changes_the_grid_alike_for_any_number_of_workers(tmp_path):
+    data = photos(tmp_path)
+    results = []
+    for workers in (1, 2, 5):
+        grid = state(1, False, workers)
+        march(grid, data, np.ones((3, 3)))
+        reduced(grid)
+        smoothed(grid)
+        stepped(grid)
+        assert not grid.accumulator.to_numpy().any()
+        results.append(grid.arrays())
+    for other in results[1:]:
+        for values, expected in zip(other, results[0], strict=True):
+            np.testing.assert_allclose(values, expected, rtol=1e-3, atol=1e-4)
+
+
+def test_gauss_newton_step_is_gradient_over_damped_curvature(tmp_path):
+    data, grid = photos(tmp_path), state(1, False)
+    march(grid, data, np.ones((3, 3)))
+    records = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, -1).sum(axis=0).astype(np.float64)
+    reduced(grid)
+    before_density, before_sh, _, _ = grid.arrays()
+    h = grid.cell.to_numpy()[1:].astype(np.float64)
+    stepped(grid)
     density, sh, running, weight = grid.arrays()
     r = records[1:]
     touched = r[:, 2] > 0
@@ -219,20 +266,9 @@ def test_gauss_newton_step_is_gradient_over_damped_curvature(tmp_path):
 def test_laplacian_is_the_gradient_of_neighbour_differences(tmp_path):
     data, grid = photos(tmp_path), state(1, False)
     march(grid, data, np.ones((3, 3)))
+    reduced(grid)
     before = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, -1).copy()
-    laplacian(
-        grid.density,
-        grid.sh,
-        grid.index,
-        grid.vertex_at,
-        grid.cell,
-        grid.accumulator,
-        grid.slots,
-        ivec3(N, N, N),
-        0.3,
-        0.2,
-        grid.terms,
-    )
+    smoothed(grid)
     after = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, -1)
     added = (after - before)[0, 1:]
     density, sh, _, _ = grid.arrays()

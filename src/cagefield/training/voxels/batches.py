@@ -13,7 +13,12 @@ from cagefield.compute.devices import floats, ints
 from cagefield.compute.quadrants import qd
 from cagefield.training.voxels.exposure import Exposure
 from cagefield.training.voxels.grid_state import GridState
-from cagefield.training.voxels.kernels.gauss_newton_voxels import StepArgs, gauss_newton, laplacian
+from cagefield.training.voxels.kernels.gauss_newton_voxels import (
+    StepArgs,
+    gauss_newton,
+    laplacian,
+    reduce_workers,
+)
 from cagefield.training.voxels.kernels.ray_batches import PatchArgs
 from cagefield.training.voxels.kernels.training_march import (
     MAX_SAMPLES,
@@ -50,6 +55,8 @@ class BatchTrainer:
         `step` seeds jitter and random backgrounds; the progress `done` sets the learning rate.
         """
         losses, sums = self._march(grid, patches, exposure.gains, step)
+        if grid.workers > 1:
+            reduce_workers(grid.accumulator, grid.record, grid.workers, grid.slots, grid.terms)
         if self._settings.laplacian_reg > 0:
             self._add_laplacian(grid)
         self._update_grid(grid, done)
@@ -92,7 +99,7 @@ class BatchTrainer:
         return losses, sums
 
     def _add_laplacian(self, grid: GridState) -> None:
-        """Add the gradient of the Laplacian regularization to the accumulator."""
+        """Add the gradient of the Laplacian regularization to the reduced accumulator."""
         laplacian(
             grid.density,
             grid.sh,
@@ -108,7 +115,7 @@ class BatchTrainer:
         )
 
     def _update_grid(self, grid: GridState, done: float) -> None:
-        """Update the grid from its accumulator, and empty the accumulator."""
+        """Update the grid from its reduced accumulator, and empty the accumulator."""
         config = self._config
         first, last = self._settings.lr
         rate = first * (last / first) ** done
@@ -119,8 +126,6 @@ class BatchTrainer:
             grid.weight,
             grid.cell,
             grid.accumulator,
-            grid.record,
-            grid.workers,
             grid.slots,
             StepArgs(
                 config.curvature_decay,

@@ -1,4 +1,5 @@
-"""Kernels that update densities and colors from a batch's records: Laplacian, diagonal Gauss-Newton step."""
+"""Kernels that update densities and colors from a batch's records: sum over workers, Laplacian, diagonal
+Gauss-Newton step."""
 
 from dataclasses import dataclass
 
@@ -26,6 +27,25 @@ class StepArgs:
 
 
 @qd.kernel(fastcache=True)
+def reduce_workers(accumulator: F32, record: qd.i32, workers: qd.i32, slots: qd.i32, K: qd.template()):
+    """Add the accumulators of the other workers to the first one's, and empty them."""
+    qd.loop_config(block_dim=256)
+    for slot in range(1, slots):
+        stride = qd.static(HEADER_FLOATS + 3 * K)
+        to = slot * stride
+        for worker in range(1, workers):
+            at = worker * record + to
+            # A ray that meets a slot adds to its color curvature.
+            if accumulator[at + 2] > 0.0:
+                accumulator[to + 3] = qd.max(accumulator[to + 3], accumulator[at + 3])
+                accumulator[at + 3] = 0.0
+                for a in qd.static(range(stride)):
+                    if qd.static(a != 3):
+                        accumulator[to + a] = accumulator[to + a] + accumulator[at + a]
+                        accumulator[at + a] = 0.0
+
+
+@qd.kernel(fastcache=True)
 def laplacian(
     density: F32,
     sh: F32,
@@ -41,7 +61,7 @@ def laplacian(
 ):
     """Add gradient and curvature of weight/2 * sum over stored neighbors (x - x_n)^2 to the batch's slots.
 
-    Slots of the batch have a color curvature in the first accumulator. Neighbors are the 6 along the axes.
+    Slots of the batch have a color curvature in the reduced accumulator. Neighbors are the 6 along the axes.
     The density's weight is multiplied by the squared voxel size: it acts on optical depth per voxel.
     """
     qd.loop_config(block_dim=256)
@@ -100,13 +120,11 @@ def gauss_newton(
     weight: F32,
     cell: F32,
     accumulator: F32,
-    record: qd.i32,
-    workers: qd.i32,
     slots: qd.i32,
     step: StepArgs,
     K: qd.template(),
 ):
-    """Take one diagonal Gauss-Newton step of every slot in the batch, and empty the accumulators.
+    """Take one diagonal Gauss-Newton step of every slot in the batch, and empty the reduced accumulator.
 
     state: [slots, 2] running sums of density and color curvature, decayed per batch with the slot.
     weight: [slots] maximum weight since the last pruning. cell: [slots] world-space voxel size h.
@@ -114,37 +132,23 @@ def gauss_newton(
     qd.loop_config(block_dim=256)
     for slot in range(1, slots):
         stride = qd.static(HEADER_FLOATS + 3 * K)
-        h_density = 0.0
-        h_color = 0.0
-        for worker in range(workers):
-            at = worker * record + slot * stride
-            h_density += accumulator[at + 1]
-            h_color += accumulator[at + 2]
+        at = slot * stride
+        h_color = accumulator[at + 2]
         if h_color > 0.0:
-            s0 = state[2 * slot] * step.decay + h_density
+            s0 = state[2 * slot] * step.decay + accumulator[at + 1]
             s1 = state[2 * slot + 1] * step.decay + h_color
             state[2 * slot] = s0
             state[2 * slot + 1] = s1
-            g_density = 0.0
-            w = weight[slot]
-            for worker in range(workers):
-                at = worker * record + slot * stride
-                g_density += accumulator[at]
-                w = qd.max(w, accumulator[at + 3])
-                for a in qd.static(range(HEADER_FLOATS)):
-                    accumulator[at + a] = 0.0
-            weight[slot] = w
-            change = step.density_rate * g_density / (s0 + step.damping * cell[slot] * cell[slot])
+            weight[slot] = qd.max(weight[slot], accumulator[at + 3])
+            change = step.density_rate * accumulator[at] / (s0 + step.damping * cell[slot] * cell[slot])
             limit = step.max_step / cell[slot]
             density[slot] = density[slot] - qd.max(qd.min(change, limit), -limit)
             rate = step.color_rate / (s1 + step.damping)
             for j in qd.static(range(3 * K)):
-                g = 0.0
-                for worker in range(workers):
-                    at = worker * record + slot * stride + HEADER_FLOATS + j
-                    g += accumulator[at]
-                    accumulator[at] = 0.0
+                g = accumulator[at + HEADER_FLOATS + j]
                 c = sh[slot * (3 * K) + j]
                 if qd.static(j >= 3):
                     g += step.view_dependence_reg * h_color * c
                 sh[slot * (3 * K) + j] = c - rate * g
+            for a in qd.static(range(stride)):
+                accumulator[at + a] = 0.0
