@@ -321,7 +321,7 @@ def test_no_fog_stays_where_space_is_known_to_be_empty(capture):
             distance = np.full(len(middle), np.linalg.norm(view.camera.origin) - 0.7)
             before.append(renderer.opacity_before(view.camera, middle, distance))
         fog.append(float(np.mean(np.concatenate(before) > 0.1)))
-    assert fog[1] < 0.02 < 0.5 < fog[0]
+    assert fog[1] < 0.02 < 0.3 < fog[0]
 
 
 def test_what_points_say_of_empty_space_is_known_in_the_photos_that_see_them(capture):
