@@ -32,6 +32,9 @@ T_MIN = float(blending.T_MIN)
 MAX_VARIANCE_PX2 = 1e15
 """Splats of larger variances, in pixels^2, are not drawn: their determinant would overflow."""
 
+HIDDEN_KEY = 0x7FFFFFFF
+"""Sorting key of a splat that is not drawn: it comes after all others."""
+
 vec2 = qd.types.vector(2, qd.f32)
 vec4 = qd.types.vector(4, qd.f32)
 vec6 = qd.types.vector(6, qd.f32)
@@ -256,8 +259,20 @@ def overlaps(packed: qd.template(), i: qd.i32, column: qd.i32, line: qd.i32):
 
 
 @qd.kernel(fastcache=True)
+def depth_keys(depths: F32, tiles: I32, keys: I32, order: I32, number: qd.i32):
+    """Writes integers in the order of the positive depths, HIDDEN_KEY for hidden splats, and rows."""
+    qd.loop_config(block_dim=128)
+    for i in range(number):
+        keys[i] = HIDDEN_KEY
+        if tiles[4 * i + 1] > tiles[4 * i]:
+            keys[i] = qd.bit_cast(depths[i], qd.i32)
+        order[i] = i
+
+
+@qd.kernel(fastcache=True)
 def count_tiles(order: I32, tiles: I32, packed: F32, counts: I32, number: qd.i32):
-    """Writes how many tiles each splat of `order` touches."""
+    """Writes how many tiles each splat of `order` touches, and 0 to counts[number]."""
+    counts[number] = 0
     qd.loop_config(block_dim=128)
     for q in range(number):
         i = order[q]
@@ -270,9 +285,9 @@ def count_tiles(order: I32, tiles: I32, packed: F32, counts: I32, number: qd.i32
 
 @qd.kernel(fastcache=True)
 def list_tiles(
-    order: I32, firsts: I32, tiles: I32, packed: F32, across: qd.i32, touched: I32, number: qd.i32
+    order: I32, firsts: I32, tiles: I32, packed: F32, across: qd.i32, touched: I32, ids: I32, number: qd.i32
 ):
-    """Writes the tiles of splat order[q] to touched[firsts[q]:firsts[q+1]]."""
+    """Writes the tiles of splat order[q], and the splat, to touched and ids [firsts[q]:firsts[q+1]]."""
     qd.loop_config(block_dim=128)
     for q in range(number):
         i = order[q]
@@ -281,7 +296,23 @@ def list_tiles(
             for column in range(tiles[4 * i], tiles[4 * i + 1]):
                 if overlaps(packed, i, column, line) == 1:
                     touched[n] = line * across + column
+                    ids[n] = i
                     n += 1
+
+
+@qd.kernel(fastcache=True)
+def tile_starts(touched: I32, starts: I32, pairs: qd.i32, tiles: qd.i32):
+    """Writes starts [tiles+1] of the tiles in the sorted `touched` [pairs]."""
+    qd.loop_config(block_dim=128)
+    for e in range(pairs + 1):
+        before = -1
+        here = tiles
+        if e > 0:
+            before = touched[e - 1]
+        if e < pairs:
+            here = touched[e]
+        for t in range(before + 1, here + 1):
+            starts[t] = e
 
 
 @qd.kernel(fastcache=True)
