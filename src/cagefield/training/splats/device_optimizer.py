@@ -166,7 +166,7 @@ class DeviceSplatOptimizer:
             count,
             intrinsics(self._camera).model,
         )
-        self._is_host_current = False
+        self._is_host_current, self._is_device_current = False, True
 
     def pose_sums(self) -> tuple[Array, Array]:
         """See `SplatOptimizer.pose_sums`; summed on the host."""
@@ -196,7 +196,7 @@ class DeviceSplatOptimizer:
             len(self),
             self._terms,
         )
-        self._is_host_current = False
+        self._is_host_current, self._is_device_current = False, True
 
     @property
     def _terms(self) -> int:

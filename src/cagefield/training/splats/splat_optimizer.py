@@ -34,7 +34,7 @@ class SplatOptimizer(Protocol):
 
     @property
     def state(self) -> SplatState:
-        """Splats on the host. Changes to them count; later steps may leave this copy stale."""
+        """Splats on the host. Changes between steps count; later steps may leave this copy stale."""
 
     @state.setter
     def state(self, state: SplatState) -> None: ...
