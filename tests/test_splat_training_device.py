@@ -145,7 +145,7 @@ def test_steps_are_those_of_the_cpu(lens: str, channels: int) -> None:
 
 
 def test_splats_behind_opaque_ones_get_no_gradient_on_either_device() -> None:
-    """A pixel is left at T_MIN on the GPU, a tile on the CPU: gradients differ by no more than that."""
+    """The GPU leaves a pixel at a transmittance of 1e-4, the CPU a tile at 1e-3."""
     view = camera("pinhole", 40, 27)
     values = parameters(40)
     ahead = -view.origin / np.linalg.norm(view.origin)

@@ -18,6 +18,7 @@ from cagefield.compute.device_buffers import DeviceBuffers, empty_array
 from cagefield.compute.devices import floats, ints
 from cagefield.rendering.splats.device_sorting import exclusive_scan, sort_by_key
 from cagefield.rendering.splats.kernels import device_rasterizer as kernels
+from cagefield.rendering.splats.kernels.blending import T_MIN
 from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE_PX
 from cagefield.rendering.splats.raster_splats import DeformedSplats
 from cagefield.rendering.splats.rasterizer import DEPTH, Region, intrinsics, untiled, world_to_camera
@@ -89,7 +90,9 @@ class DeviceProjection:
     def blend(self, channels: int = DEPTH) -> tuple[Float32, NDArray[np.int64]]:
         """The picture [tiles,channels,AREA], and where each tile's splats end; see `Projection.blend`."""
         out = empty_array(self.tiles * channels * AREA)
-        kernels.blend(self.packed, self.ids, self.starts, self.tiles, self.across, out, channels)
+        kernels.blend(
+            self.packed, self.ids, self.starts, self.tiles, self.across, out, float(T_MIN), channels
+        )
         return out.to_numpy().reshape(self.tiles, channels, AREA), self.ends
 
     def picture(self, channels: int = DEPTH) -> Float32:

@@ -97,7 +97,16 @@ class DeviceSplatOptimizer:
         self._camera = camera
         seen = self._projected = project_args(splats, self._terms, camera, self._near, buffers)
         self._image = buffers.take("image", seen.tiles * COLOR * AREA)
-        raster_kernels.blend(seen.packed, seen.ids, seen.starts, seen.tiles, seen.across, self._image, COLOR)
+        raster_kernels.blend(
+            seen.packed,
+            seen.ids,
+            seen.starts,
+            seen.tiles,
+            seen.across,
+            self._image,
+            device_pixels.T_MIN,
+            COLOR,
+        )
 
     def compare(self, photo: Photo) -> Float32:
         """See `SplatOptimizer.compare`."""

@@ -1,8 +1,7 @@
 """Splat projection and blending on Quadrants' devices, for GPUs; see `projection` and `blending`.
 
-Notation and layouts (packed splats, tiles) as there. One thread has one splat, or one pixel; a pixel is left
-once it lets less than T_MIN through. Everything is float32: splats as thin as a pixel and much longer than a
-picture come out some percent wider or narrower.
+Notation and layouts (packed splats, tiles) as there. One thread has one splat, or one pixel. Everything is
+float32: splats as thin as a pixel and much longer than a picture come out some percent wider or narrower.
 
 The oracle is `cagefield.rendering.splats.reference_rasterizer`.
 """
@@ -12,7 +11,6 @@ The oracle is `cagefield.rendering.splats.reference_rasterizer`.
 from dataclasses import dataclass
 
 from cagefield.compute.quadrants import qd
-from cagefield.rendering.splats.kernels import blending
 from cagefield.rendering.splats.kernels.projection import (
     ALPHA_MAX,
     ALPHA_MIN,
@@ -26,8 +24,6 @@ from cagefield.rendering.splats.kernels.projection import (
     TILE_PX,
 )
 from cagefield.rendering.voxels.kernels.grid import F32, I32, sh_basis, vec3
-
-T_MIN = float(blending.T_MIN)
 
 MAX_VARIANCE_PX2 = 1e15
 """Splats of larger variances, in pixels^2, are not drawn: their determinant would overflow."""
@@ -317,9 +313,19 @@ def tile_starts(touched: I32, starts: I32, pairs: qd.i32, tiles: qd.i32):
 
 @qd.kernel(fastcache=True)
 def blend(
-    packed: F32, ids: I32, starts: I32, count: qd.i32, across: qd.i32, out: F32, channels: qd.template()
+    packed: F32,
+    ids: I32,
+    starts: I32,
+    count: qd.i32,
+    across: qd.i32,
+    out: F32,
+    t_min: qd.f32,
+    channels: qd.template(),
 ):
-    """Blends all tiles into out [tiles, channels, AREA]; see `blending.blend`."""
+    """Blends all tiles into out [tiles, channels, AREA]; see `blending.blend`.
+
+    A pixel is left once it lets less than `t_min` through.
+    """
     qd.loop_config(block_dim=AREA)
     for n in range(count * AREA):
         t = n // AREA
@@ -332,7 +338,7 @@ def blend(
         depth = 0.0
         e = starts[t]
         end = starts[t + 1]
-        while e < end and T >= T_MIN:
+        while e < end and t_min <= T:
             row = PACKED * ids[e]
             dx = x - packed[row]
             dy = y - packed[row + 1]

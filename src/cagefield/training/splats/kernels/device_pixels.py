@@ -1,8 +1,7 @@
 """Residuals of an image's pixels, and their gradients and curvatures by splats, on Quadrants' devices.
 
-One thread has one pixel. Notation and sums as in `rendering.splats.kernels.blending`; a pixel is left once it
-lets less than T_MIN through, as in `rendering.splats.kernels.device_rasterizer`. Each pixel adds to the sums
-of a splat by atomics, so that the last digits of the sums depend on the order of threads.
+One thread has one pixel. Notation and sums as in `rendering.splats.kernels.blending`. Each pixel adds to the
+sums of a splat by atomics, so that the last digits of the sums depend on the order of threads.
 
 The oracle is finite differences of `cagefield.rendering.splats.reference_rasterizer`.
 """
@@ -11,10 +10,12 @@ The oracle is finite differences of `cagefield.rendering.splats.reference_raster
 
 from cagefield.compute.quadrants import qd
 from cagefield.rendering.splats.kernels.blending import SUMS
-from cagefield.rendering.splats.kernels.device_rasterizer import T_MIN
 from cagefield.rendering.splats.kernels.projection import ALPHA_MAX, ALPHA_MIN, AREA, PACKED, TILE_PX
 from cagefield.rendering.voxels.kernels.grid import F32, I32, vec3
 from cagefield.training.splats.kernels.device_args import PhotoArgs, photo_value
+
+T_MIN = 1e-4
+"""Transmittance below which a pixel is left; the CPU leaves a tile once all of its pixels are below 1e-3."""
 
 TILE_SUMS = 7
 """Sums of a tile: squared error, image x photo (3), image^2 (3); see `gauss_newton_splats.residuals`."""
