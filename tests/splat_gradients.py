@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera
+from cagefield.fields import sh as harmonics
 from cagefield.rendering.splats import reference_rasterizer as reference
 from cagefield.rendering.splats.rasterizer import (
     COLOR,
@@ -24,7 +25,7 @@ from cagefield.training.splats.kernels.splat_backward import (
     ParameterArgs,
     backpropagate,
 )
-from splat_views import NEAR, single, splats_of
+from splat_views import NEAR, parameters, single, splats_of, unit
 
 Values = dict[str, NDArray]
 
@@ -102,3 +103,52 @@ def settled(values: Values, view: Camera, antialiased: bool) -> Values:
         values["logits"][bad] += chance.uniform(-0.05, 0.05, len(bad))
         values = rounded(values)
     raise AssertionError("no such parameters found")
+
+
+PARTS = {"means": (0, 3), "log_scales": (3, 3), "quaternions": (6, 3), "logits": (9, 1), "colour": (10, 3)}
+"""Where each parameter's gradient lies, and how many numbers it has."""
+
+
+def moved(values: Values, name: str, splat: int, axis: int, step: float) -> Values:
+    """The parameters with one of them changed; "quaternions" by a turn, "colour" by its constant harmonic."""
+    values = {key: part.copy() for key, part in values.items()}
+    if name == "quaternions":
+        w, v = values[name][splat, 0], values[name][splat, 1:]
+        half = 0.5 * step * np.eye(3)[axis]
+        # q (1, half): a turn about the splat's own axis.
+        turned = np.concatenate([[w - v @ half], v + w * half + np.cross(v, half)])
+        values[name][splat] = unit(turned)
+    elif name == "colour":
+        values["sh"][splat, 0, axis] += step / harmonics.C0
+    elif name == "logits":
+        values[name][splat] += step
+    else:
+        values[name][splat, axis] += step
+    return values
+
+
+def differences(
+    picture: Callable[[Values], NDArray], values: Values, name: str, splat: int, axis: int, step: float = 1e-6
+) -> NDArray:
+    """d(picture)/d(parameter) [H,W,3] by central differences; rounding is some 1e-8 of it."""
+    ahead = picture(moved(values, name, splat, axis, step))
+    behind = picture(moved(values, name, splat, axis, -step))
+    return (ahead - behind) / (2.0 * step)
+
+
+def scene(view: Camera, antialiased: bool, degree: int, seed: int) -> tuple[Values, NDArray, NDArray]:
+    """Random parameters, a target [H,W,3] and a background [3]."""
+    chance = np.random.default_rng(seed)
+    values = parameters(14, degree, seed)
+    # One opaque enough for ALPHA_MAX to hold, one beyond the edge whose shape no longer follows, one colour
+    # that is clamped at 0, one far smaller than a pixel.
+    values["logits"][0] = 6.0
+    right = view.c2w[:3, 0]
+    values["means"][1] = 3.2 * right
+    values["log_scales"][1] = np.log((1.2, 0.7, 0.6))
+    values["logits"][1] = 1.0
+    values["sh"][2, 0] = (-3.0, 0.2, 0.1)
+    values["log_scales"][3] = np.log(0.004)
+    values["logits"][3] = 2.0
+    target = chance.uniform(size=(view.height, view.width, 3))
+    return settled(rounded(values), view, antialiased), target, chance.uniform(size=3)

@@ -54,8 +54,8 @@ class Train:
     """Scene folder."""
     field: FieldKind = "auto"
     """splat are 3D Gaussians, made for captures of real places; voxel is a grid, made for things on a plain
-    background; auto takes splats where a capture is unbounded, else voxels. nerf is the original NeRF, needs
-    PyTorch, and is baked into voxels at the end."""
+    background; both are trained on the GPU where there is one. auto takes splats where a capture is
+    unbounded, else voxels. nerf is the original NeRF, needs PyTorch, and is baked into voxels at the end."""
     splats: int | None = None
     """Most splats at the end; left out, as many as the photos and the time allow."""
     robust: Flag = False

@@ -1,7 +1,7 @@
 """Splat rasterizer on Quadrants' device: the host side of `kernels.device_rasterizer`, for GPUs.
 
-The layout of images equals that of `rasterizer` on the CPU. Sorting is done on the host: depths, then
-the tiles that each splat touches, both stable.
+The layout of images equals that of `rasterizer` on the CPU. Splats are sorted by depth, then their pairs with
+tiles by tile, both stable; see `device_sorting`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,11 @@ from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
+from cagefield.compute.device_buffers import DeviceBuffers, empty_array
 from cagefield.compute.devices import floats, ints
+from cagefield.rendering.splats.device_sorting import exclusive_scan, sort_by_key
 from cagefield.rendering.splats.kernels import device_rasterizer as kernels
+from cagefield.rendering.splats.kernels.blending import T_MIN
 from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE_PX
 from cagefield.rendering.splats.raster_splats import DeformedSplats
 from cagefield.rendering.splats.rasterizer import DEPTH, Region, intrinsics, untiled, world_to_camera
@@ -30,12 +33,16 @@ _UNUSED: Float32 = np.zeros(1, np.float32)
 
 
 class SplatArrays:
-    """Splats on the device, kept from image to image; with their normals [N,3] where these were given."""
+    """Splats on the device, kept from image to image; with their normals [N,3] where these were given.
+
+    `buffers` are shared by the splats' projections: one is valid until the next.
+    """
 
     def __init__(self, splats: DeformedSplats, normals: Float32 | None = None) -> None:
         devices.start()
         self.splats = splats
         self.has_normals = normals is not None
+        self.buffers = DeviceBuffers()
         self.args = kernels.SplatArgs(
             means=to_device(splats.means),
             covariances=to_device(splats.covariances),
@@ -52,12 +59,16 @@ class SplatArrays:
 
 @dataclass(frozen=True, eq=False)
 class DeviceProjection:
-    """As `rasterizer.Projection`, with packed splats, `ids` and `starts` on the device."""
+    """As `rasterizer.Projection`, with its arrays on the device, which may be longer than their contents.
+
+    `boxes` [N,4] are the tiles that each splat touches at most, x1 = 0 for splats that are not drawn.
+    """
 
     packed: Any
+    boxes: Any
     ids: Any
     starts: Any
-    ends: NDArray[np.int64]
+    pairs: int
     width: int
     height: int
 
@@ -69,12 +80,19 @@ class DeviceProjection:
     @property
     def tiles(self) -> int:
         """Tiles of the picture."""
-        return len(self.ends)
+        return self.across * -(-self.height // TILE_PX)
+
+    @property
+    def ends(self) -> NDArray[np.int64]:
+        """End [tiles] of each tile's splats in `ids`."""
+        return self.starts.to_numpy()[1 : self.tiles + 1].astype(np.int64)
 
     def blend(self, channels: int = DEPTH) -> tuple[Float32, NDArray[np.int64]]:
         """The picture [tiles,channels,AREA], and where each tile's splats end; see `Projection.blend`."""
-        out = _empty(self.tiles * channels * AREA)
-        kernels.blend(self.packed, self.ids, self.starts, self.tiles, self.across, out, channels)
+        out = empty_array(self.tiles * channels * AREA)
+        kernels.blend(
+            self.packed, self.ids, self.starts, self.tiles, self.across, out, float(T_MIN), channels
+        )
         return out.to_numpy().reshape(self.tiles, channels, AREA), self.ends
 
     def picture(self, channels: int = DEPTH) -> Float32:
@@ -83,7 +101,7 @@ class DeviceProjection:
 
     def opacity_before(self, pixels: NDArray[Any], distances: NDArray[Any]) -> Float32:
         """Opacity [K] gathered before distances [K] along the rays of pixels [K,2] inside the picture."""
-        out = _empty(len(pixels))
+        out = empty_array(len(pixels))
         kernels.opacity_before(
             self.packed,
             self.ids,
@@ -101,53 +119,59 @@ def project(
     arrays: SplatArrays, camera: Camera, *, near: float, region: Region | None = None
 ) -> DeviceProjection:
     """The splats as `camera` sees them; see `rasterizer.project`."""
+    return project_args(arrays.args, arrays.splats.sh.shape[1], camera, near, arrays.buffers, region)
+
+
+def project_args(
+    splats: kernels.SplatArgs,
+    terms: int,
+    camera: Camera,
+    near: float,
+    buffers: DeviceBuffers,
+    region: Region | None = None,
+) -> DeviceProjection:
+    """Splats of `terms` harmonics as `camera` sees them; valid until `buffers` are projected to again."""
+    x, y, width, height = region or (0, 0, camera.width, camera.height)
+    count = splats.count
+    packed, depths = buffers.take("packed", count * PACKED), buffers.take("depths", count)
+    boxes = buffers.take("boxes", count * 4, np.int32)
+    kernels.project(
+        splats,
+        camera_args(camera, near, (x, y, width, height)),
+        kernels.ProjectionArgs(packed, depths, boxes),
+        terms,
+        intrinsics(camera).model,
+    )
+    keys, order = buffers.take("keys", count, np.int32), buffers.take("order", count, np.int32)
+    kernels.depth_keys(depths, boxes, keys, order, count)
+    order = sort_by_key(keys, order, count, kernels.HIDDEN_KEY, "splats", buffers)[1]
+    firsts = buffers.take("firsts", count + 1, np.int32)
+    kernels.count_tiles(order, boxes, packed, firsts, count)
+    exclusive_scan(firsts, count + 1, buffers)
+    pairs = int(firsts[count])
+    across, down = -(-width // TILE_PX), -(-height // TILE_PX)
+    touched, ids = buffers.take("touched", pairs, np.int32), buffers.take("ids", pairs, np.int32)
+    kernels.list_tiles(order, firsts, boxes, packed, across, touched, ids, count)
+    touched, ids = sort_by_key(touched, ids, pairs, across * down - 1, "pairs", buffers)
+    starts = buffers.take("starts", across * down + 1, np.int32)
+    kernels.tile_starts(touched, starts, pairs, across * down)
+    return DeviceProjection(packed, boxes, ids, starts, pairs, width, height)
+
+
+def camera_args(camera: Camera, near: float, region: Region | None = None) -> kernels.CameraArgs:
+    """Kernel arguments of a camera and the part (x, y, width, height) of its image."""
     x, y, width, height = region or (0, 0, camera.width, camera.height)
     lens = intrinsics(camera)
-    count = len(arrays.splats)
-    packed, keys = _empty(count * PACKED), _empty(count)
-    boxes = to_device(np.zeros(max(1, count) * 4, np.int32))
     origin = camera.origin.astype(np.float32).astype(np.float64)
-    across, down = -(-width // TILE_PX), -(-height // TILE_PX)
-    kernels.project(
-        arrays.args,
-        kernels.CameraArgs(
-            floats(world_to_camera(camera)),
-            floats(origin),
-            floats(camera.origin - origin),
-            floats(lens.focal),
-            floats(lens.center - (x, y)),
-            ints((width, height)),
-            floats(lens.limits),
-            floats(lens.coefficients),
-            min(lens.radius_limit, _FARTHEST),
-            near,
-        ),
-        kernels.ProjectionArgs(packed, keys, boxes),
-        arrays.splats.sh.shape[1],
-        lens.model,
+    return kernels.CameraArgs(
+        floats(world_to_camera(camera)),
+        floats(origin),
+        floats(camera.origin - origin),
+        floats(lens.focal),
+        floats(lens.center - (x, y)),
+        ints((width, height)),
+        floats(lens.limits),
+        floats(lens.coefficients),
+        min(lens.radius_limit, _FARTHEST),
+        near,
     )
-    box = boxes.to_numpy().reshape(-1, 4)
-    shown = np.flatnonzero(box[:, 1] > box[:, 0])
-    order = shown[np.argsort(keys.to_numpy()[shown], kind="stable")]
-    on_device = to_device(order.astype(np.int32))
-    counts = to_device(np.zeros(max(1, len(order)), np.int32))
-    kernels.count_tiles(on_device, boxes, packed, counts, len(order))
-    firsts = np.concatenate([[0], np.cumsum(counts.to_numpy()[: len(order)], dtype=np.int64)])
-    touched = to_device(np.zeros(max(1, int(firsts[-1])), np.int32))
-    kernels.list_tiles(
-        on_device, to_device(firsts.astype(np.int32)), boxes, packed, across, touched, len(order)
-    )
-    tile_of = touched.to_numpy()[: int(firsts[-1])]
-    by_tile = np.argsort(tile_of, kind="stable")
-    starts = np.concatenate([[0], np.cumsum(np.bincount(tile_of, minlength=across * down), dtype=np.int64)])
-    ids = np.repeat(order, np.diff(firsts))[by_tile].astype(np.int32)
-    return DeviceProjection(
-        packed, to_device(ids), to_device(starts.astype(np.int32)), starts[1:], width, height
-    )
-
-
-def _empty(size: int) -> Any:
-    """An uninitialised float32 array on the device."""
-    from cagefield.compute.quadrants import qd
-
-    return qd.ndarray(dtype=qd.f32, shape=(max(1, size),))

@@ -52,11 +52,8 @@ class PoseRefinement:
         """Moved camera of a photo, at any image size."""
         return move_camera(camera, self.motions[index])
 
-    def step(
-        self, index: int, origin: Array, state: SplatState, visible: NDArray[np.int64], rate: float
-    ) -> None:
-        """Move a photo's camera, now at `origin`, by the gradients of the splats `visible` in the photo."""
-        gradient, curvature = pose_sums(origin, state, visible)
+    def step(self, index: int, gradient: Array, curvature: Array, rate: float) -> None:
+        """Move a photo's camera by the (gradient [6], curvature [6,6]) of its motion; see `pose_sums`."""
         units = np.repeat([self._depth, 1.0], 3)
         gradient, curvature = gradient * units, curvature * units * units[:, None]
         damped = curvature + (RELATIVE_DAMPING * np.trace(curvature) / 6.0 + 1e-12) * np.eye(6)

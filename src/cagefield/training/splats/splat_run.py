@@ -13,20 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera
+from cagefield.compute import devices
 from cagefield.datasets.views import Dataset
 from cagefield.fields.splat_field import SplatField
-from cagefield.rendering.splats.kernels.blending import SUMS
 from cagefield.rendering.splats.kernels.projection import AREA, TILE_PX
-from cagefield.rendering.splats.raster_splats import DeformedSplats
-from cagefield.rendering.splats.rasterizer import (
-    COLOR,
-    Buffers,
-    Projection,
-    camera_args,
-    kernels,
-    near_depth,
-    project,
-)
+from cagefield.rendering.splats.rasterizer import Buffers, near_depth
 from cagefield.training.checkpoint import read_checkpoint, signature_options, write_checkpoint
 from cagefield.training.checkpoint_checks import (
     ArrayForm,
@@ -35,6 +26,7 @@ from cagefield.training.checkpoint_checks import (
     check_run,
     reject_damage,
 )
+from cagefield.training.splats.cpu_optimizer import CpuSplatOptimizer
 from cagefield.training.splats.densification import needle_mask, prune_mask, split_splats
 from cagefield.training.splats.free_space import FreeSpace
 from cagefield.training.splats.initialization import (
@@ -45,12 +37,12 @@ from cagefield.training.splats.initialization import (
     initialize_splats,
     median_camera_distance,
 )
-from cagefield.training.splats.kernels.gauss_newton_splats import StepArgs, gauss_newton, residuals
-from cagefield.training.splats.kernels.splat_backward import PairArgs, backpropagate, build_covariances
-from cagefield.training.splats.kernels.ssim import MOMENT_PLANES, WINDOW_PIXELS, add_ssim_gradient
+from cagefield.training.splats.kernels.gauss_newton_splats import StepArgs
+from cagefield.training.splats.kernels.ssim import WINDOW_PIXELS
 from cagefield.training.splats.pose_optimization import POSE_START_PROGRESS, PoseRefinement
 from cagefield.training.splats.robust_weights import ROBUST_START_PROGRESS, RobustWeights
 from cagefield.training.splats.splat_config import CHECKPOINT_KEYS, SplatConfig
+from cagefield.training.splats.splat_optimizer import Photo, SplatOptimizer
 from cagefield.training.splats.splat_state import SplatState
 from cagefield.training.splats.training_views import load_views
 
@@ -91,6 +83,15 @@ def max_splats(cameras: Sequence[Camera], config: SplatConfig) -> int:
     return int(np.clip(MAX_SPLATS_PER_PIXEL * pixels * (minutes / 5.0) ** 0.5, 2000, 1_000_000))
 
 
+def new_optimizer(state: SplatState, near: float, antialiased: bool) -> SplatOptimizer:
+    """Optimizer on the GPU where kernels run on one, else on the CPU."""
+    if devices.is_gpu():
+        from cagefield.training.splats.device_optimizer import DeviceSplatOptimizer
+
+        return DeviceSplatOptimizer(state, near, antialiased)
+    return CpuSplatOptimizer(state, near, antialiased)
+
+
 class SplatRun:
     """Training run of a SplatField; a `loop.Run`."""
 
@@ -102,14 +103,13 @@ class SplatRun:
         self._scale = median_camera_distance([view.camera for view in dataset.train], dataset.bounds)
         self._near = near_depth(dataset.bounds)
         self._max_splats = max_splats([view.cameras[0] for view in self.views], config)
-        self.state, self.free_distances = seeds or initialize_splats(
-            dataset, self.views, config, self._max_splats
-        )
-        self._depths = depth_ranges([view.cameras[0] for view in self.views], self.state.means)
+        state, self.free_distances = seeds or initialize_splats(dataset, self.views, config, self._max_splats)
+        self._optimizer = new_optimizer(state, self._near, config.antialiased)
+        self._depths = depth_ranges([view.cameras[0] for view in self.views], state.means)
         self._free_space = FreeSpace(
             [view.cameras[0] for view in self.views],
             [None if depth is None else depth[0] / MIN_DEPTH_SHARE for depth in self._depths],
-            self.state.means,
+            state.means,
         )
         alpha = self.views[0].has_alpha
         self.background = np.full(3, 1.0 if dataset.white_background else 0.0, np.float32)
@@ -124,6 +124,11 @@ class SplatRun:
         self._queue: list[int] = []
         self.step, self.seconds, self.running_loss = 0, 0.0, float("nan")
         self._is_first_step = True
+
+    @property
+    def state(self) -> SplatState:
+        """Splats on the host; changes to them count, later steps may leave them stale."""
+        return self._optimizer.state
 
     @property
     def done(self) -> float:
@@ -155,65 +160,30 @@ class SplatRun:
 
     def step_photo(self, index: int, done: float) -> None:
         """Take one step of all splats visible in a photo."""
-        config, state = self._config, self.state
+        config, optimizer = self._config, self._optimizer
         level = next((level for level, until in LEVEL_END_PROGRESS if done < until), 0)
         camera, target = self.views[index].level(level)
         if config.refine_poses:
             camera = self.poses.camera(index, camera)
-        count = len(state)
-        covariances = self._buffers.take("covariances", (count, 6), np.float32)
-        opacities = self._buffers.take("opacities", (count,), np.float32)
-        with kernels():
-            build_covariances(state.log_scales, state.quaternions, state.logits, covariances, opacities)
+        kept = None
         if config.dropout > 0.0:
-            opacities *= self._rng.random(count, np.float32) >= config.dropout * done
-        splats = DeformedSplats(state.means, covariances, opacities, state.sh, None, config.antialiased)
-        projected = project(splats, camera, near=self._near, buffers=self._buffers)
-        out, stops = projected.blend(COLOR)
-        color = self._buffers.take("color", (projected.tiles, 3, AREA), np.float32)
-        slopes = self._buffers.take("slopes", (projected.tiles, 3, AREA), np.float32)
-        tile_sums = np.empty((projected.tiles, 7), np.float32)
+            kept = self._rng.random(len(optimizer), np.float32) >= config.dropout * done
+        optimizer.render(camera, kept)
         background = self._next_background()
         gain = self.gains[index]
         rate = config.lr[0] * (config.lr[1] / config.lr[0]) ** done
         degree = max(n for n in range(config.sh_degree + 1) if done >= DEGREE_START_PROGRESS[n])
-        weights = self._weights(index, level, projected.tiles)
-        with kernels():
-            size = projected.width, projected.height
-            residuals(out, target, *size, gain, background, weights, color, slopes, tile_sums)
-            if self._robust is not None and level == 0:
-                self._robust.add(index, slopes, gain, self.views[index].valid_at(0))
-            uses_ssim = config.ssim_lambda > 0.0 and done >= SSIM_START_PROGRESS
-            if uses_ssim and min(size) >= WINDOW_PIXELS:
-                self._add_ssim_slopes(projected, color, target, gain, background, weights, slopes)
-            sums = self._buffers.take("sums", (max(projected.pairs, 1), SUMS), np.float32)
-            projected.gradients(
-                color, slopes, stops, sums, self.free_distances[index], config.empty_space_penalty, weights
-            )
-            backpropagate(
-                PairArgs(projected.order, projected.firsts, projected.slots, sums),
-                projected.packed,
-                state.parameter_args(),
-                splats.opacities,
-                camera_args(camera, self._near),
-                config.antialiased,
-                False,
-                state.gradients,
-                state.curvatures,
-            )
-            if config.refine_poses and done >= POSE_START_PROGRESS:
-                self.poses.step(index, camera.origin, state, projected.order, min(rate, 1.0))
-            gauss_newton(
-                projected.order,
-                state.gradients,
-                state.curvatures,
-                state.parameter_args(),
-                camera.origin,
-                state.average_args(),
-                self._step_args(rate, degree),
-            )
-        state.error[projected.order] += state.gradients[projected.order, 15]
-        state.hits[projected.order] += 1
+        weights = self._weights(index, level, len(target))
+        tile_sums = optimizer.compare(Photo(target, weights, gain, background))
+        if self._robust is not None and level == 0:
+            self._robust.add(index, optimizer.slopes(), gain, self.views[index].valid_at(0))
+        uses_ssim = config.ssim_lambda > 0.0 and done >= SSIM_START_PROGRESS
+        if uses_ssim and min(camera.width, camera.height) >= WINDOW_PIXELS:
+            optimizer.add_ssim(config.ssim_lambda)
+        optimizer.backpropagate(self.free_distances[index], config.empty_space_penalty)
+        if config.refine_poses and done >= POSE_START_PROGRESS:
+            self.poses.step(index, *optimizer.pose_sums(), min(rate, 1.0))
+        optimizer.update(self._step_args(rate, degree))
         self._update_gain(index, tile_sums)
         loss = float(tile_sums[:, 0].sum()) / max(3.0 * float(weights.sum()), 1.0)
         self.running_loss = loss if not self.running_loss > 0 else 0.98 * self.running_loss + 0.02 * loss
@@ -230,26 +200,6 @@ class SplatRun:
             scale_range=np.array([1e-5, 1e3]) * self._scale,
             pull=-config.opacity_reg,
         )
-
-    def _add_ssim_slopes(
-        self,
-        projected: Projection,
-        color: NDArray[np.float32],
-        target: NDArray[np.uint8],
-        gain: NDArray[np.float32],
-        background: NDArray[np.float32],
-        weights: NDArray[np.float32],
-        slopes: NDArray[np.float32],
-    ) -> None:
-        """Add the SSIM gradient of the image's pixels to `slopes`."""
-        size = (projected.height, projected.width)
-        add_ssim_gradient(
-            color, target, projected.width, projected.height, gain, background, weights,
-            self._config.ssim_lambda,
-            self._buffers.take("moments", (3, MOMENT_PLANES, *size), np.float32),
-            self._buffers.take("moment_slopes", (3, 3, *size), np.float32),
-            self._buffers.take("pixels", (3, 2, *size), np.float32), slopes,
-        )  # fmt: skip
 
     def _weights(self, index: int, level: int, tiles: int) -> NDArray[np.float32]:
         """Weights [tiles,AREA] of a photo's pixels, 0 for masked pixels."""
@@ -328,7 +278,7 @@ class SplatRun:
             psnr=-10.0 * float(np.log10(max(self.running_loss, 1e-10))),
             seconds=self.seconds,
             seconds_left=max(left, 0.0),
-            splats=len(self.state),
+            splats=len(self._optimizer),
         )
 
     def store(self, path: Path) -> None:
@@ -340,7 +290,8 @@ class SplatRun:
             "queue": self._queue,
             "random": self._rng.bit_generator.state,
         }
-        arrays = {field.name: getattr(self.state, field.name) for field in dataclasses.fields(self.state)}
+        state = self.state
+        arrays = {field.name: getattr(state, field.name) for field in dataclasses.fields(state)}
         arrays |= {"gains": self.gains, "motions": self.poses.motions}
         if self._robust is not None:
             arrays |= {"residuals": self._robust.residuals, "visits": self._robust.visits}
@@ -359,7 +310,8 @@ class SplatRun:
 
     def _take(self, scalars: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
         """Set the state to a checkpoint's. Raises ValueError where its scalars or arrays are inconsistent."""
-        own = {field.name: getattr(self.state, field.name) for field in dataclasses.fields(self.state)}
+        state = self.state
+        own = {field.name: getattr(state, field.name) for field in dataclasses.fields(state)}
         forms: dict[str, ArrayForm] = {
             name: (str(array.dtype), ("N", *array.shape[1:])) for name, array in own.items()
         }
@@ -381,7 +333,7 @@ class SplatRun:
         if self._robust is not None:
             self._robust.residuals, self._robust.visits = arrays.pop("residuals"), arrays.pop("visits")
             self._robust.scale = float(scalars["robust_scale"])
-        self.state = SplatState(**arrays)
+        self._optimizer.state = SplatState(**arrays)
         self.step, self.seconds = scalars["step"], scalars["seconds"]
         self.running_loss, self._queue = scalars["running_loss"], [int(number) for number in queue]
 

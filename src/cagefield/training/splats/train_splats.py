@@ -1,10 +1,11 @@
 """Training of a SplatField: from surface points, coarse to fine, by damped Gauss-Newton steps.
 
 A run starts with splats at the data set's points and at points from plane sweeping (`initialization`,
-`plane_sweep`). Each step renders one photo's view (`rendering.splats.rasterizer`), propagates the error to
-every visible splat (`kernels.splat_backward`), and takes a Gauss-Newton step of each splat
-(`kernels.gauss_newton_splats`). The photos' resolution and the SH degree grow during the run. Between steps,
-splats with a large error are split and splats without effect are removed (`densification`).
+`plane_sweep`). Each step renders one photo's view, propagates the error to every visible splat, and takes a
+Gauss-Newton step of each splat: in `cpu_optimizer` on the CPU, in `device_optimizer` on a GPU, with equal
+mathematics (`kernels.splat_backward`, `kernels.gauss_newton_splats`). The photos' resolution and the SH
+degree grow during the run. Between steps, splats with a large error are split and splats without effect are
+removed (`densification`).
 
 On a CPU a run of given `steps` gives equal fields for equal seeds.
 """
@@ -45,8 +46,8 @@ def train_splat(
     A capture without points first gets points from its poses (`starting_points`), which are cached; then the
     photos' surfaces are swept. `seeds` replace both. `on_stage` gets a stage's name, its progress, and a
     note. With `checkpoint`, the state of the run is written every minute and at the end, which Ctrl-C brings
-    early (`finished` is then False); `resume` continues the checkpoint. On a CPU a resumed run of given
-    `steps` ends in the field of an uninterrupted one.
+    early (`finished` is then False); `resume` continues the checkpoint, on the same device or another. On a
+    CPU a resumed run of given `steps` ends in the field of an uninterrupted one.
 
     Raises:
         DatasetError: no photos, or unreadable photos.

@@ -1,8 +1,7 @@
 """Splat projection and blending on Quadrants' devices, for GPUs; see `projection` and `blending`.
 
-Notation and layouts (packed splats, tiles) as there. One thread has one splat, or one pixel; a pixel is left
-once it lets less than T_MIN through. Everything is float32: splats as thin as a pixel and much longer than a
-picture come out some percent wider or narrower.
+Notation and layouts (packed splats, tiles) as there. One thread has one splat, or one pixel. Everything is
+float32: splats as thin as a pixel and much longer than a picture come out some percent wider or narrower.
 
 The oracle is `cagefield.rendering.splats.reference_rasterizer`.
 """
@@ -12,7 +11,6 @@ The oracle is `cagefield.rendering.splats.reference_rasterizer`.
 from dataclasses import dataclass
 
 from cagefield.compute.quadrants import qd
-from cagefield.rendering.splats.kernels import blending
 from cagefield.rendering.splats.kernels.projection import (
     ALPHA_MAX,
     ALPHA_MIN,
@@ -27,10 +25,11 @@ from cagefield.rendering.splats.kernels.projection import (
 )
 from cagefield.rendering.voxels.kernels.grid import F32, I32, sh_basis, vec3
 
-T_MIN = float(blending.T_MIN)
-
 MAX_VARIANCE_PX2 = 1e15
 """Splats of larger variances, in pixels^2, are not drawn: their determinant would overflow."""
+
+HIDDEN_KEY = 0x7FFFFFFF
+"""Sorting key of a splat that is not drawn: it comes after all others."""
 
 vec2 = qd.types.vector(2, qd.f32)
 vec4 = qd.types.vector(4, qd.f32)
@@ -256,8 +255,20 @@ def overlaps(packed: qd.template(), i: qd.i32, column: qd.i32, line: qd.i32):
 
 
 @qd.kernel(fastcache=True)
+def depth_keys(depths: F32, tiles: I32, keys: I32, order: I32, number: qd.i32):
+    """Writes integers in the order of the positive depths, HIDDEN_KEY for hidden splats, and rows."""
+    qd.loop_config(block_dim=128)
+    for i in range(number):
+        keys[i] = HIDDEN_KEY
+        if tiles[4 * i + 1] > tiles[4 * i]:
+            keys[i] = qd.bit_cast(depths[i], qd.i32)
+        order[i] = i
+
+
+@qd.kernel(fastcache=True)
 def count_tiles(order: I32, tiles: I32, packed: F32, counts: I32, number: qd.i32):
-    """Writes how many tiles each splat of `order` touches."""
+    """Writes how many tiles each splat of `order` touches, and 0 to counts[number]."""
+    counts[number] = 0
     qd.loop_config(block_dim=128)
     for q in range(number):
         i = order[q]
@@ -270,9 +281,9 @@ def count_tiles(order: I32, tiles: I32, packed: F32, counts: I32, number: qd.i32
 
 @qd.kernel(fastcache=True)
 def list_tiles(
-    order: I32, firsts: I32, tiles: I32, packed: F32, across: qd.i32, touched: I32, number: qd.i32
+    order: I32, firsts: I32, tiles: I32, packed: F32, across: qd.i32, touched: I32, ids: I32, number: qd.i32
 ):
-    """Writes the tiles of splat order[q] to touched[firsts[q]:firsts[q+1]]."""
+    """Writes the tiles of splat order[q], and the splat, to touched and ids [firsts[q]:firsts[q+1]]."""
     qd.loop_config(block_dim=128)
     for q in range(number):
         i = order[q]
@@ -281,14 +292,40 @@ def list_tiles(
             for column in range(tiles[4 * i], tiles[4 * i + 1]):
                 if overlaps(packed, i, column, line) == 1:
                     touched[n] = line * across + column
+                    ids[n] = i
                     n += 1
 
 
 @qd.kernel(fastcache=True)
+def tile_starts(touched: I32, starts: I32, pairs: qd.i32, tiles: qd.i32):
+    """Writes starts [tiles+1] of the tiles in the sorted `touched` [pairs]."""
+    qd.loop_config(block_dim=128)
+    for e in range(pairs + 1):
+        before = -1
+        here = tiles
+        if e > 0:
+            before = touched[e - 1]
+        if e < pairs:
+            here = touched[e]
+        for t in range(before + 1, here + 1):
+            starts[t] = e
+
+
+@qd.kernel(fastcache=True)
 def blend(
-    packed: F32, ids: I32, starts: I32, count: qd.i32, across: qd.i32, out: F32, channels: qd.template()
+    packed: F32,
+    ids: I32,
+    starts: I32,
+    count: qd.i32,
+    across: qd.i32,
+    out: F32,
+    t_min: qd.f32,
+    channels: qd.template(),
 ):
-    """Blends all tiles into out [tiles, channels, AREA]; see `blending.blend`."""
+    """Blends all tiles into out [tiles, channels, AREA]; see `blending.blend`.
+
+    A pixel is left once it lets less than `t_min` through.
+    """
     qd.loop_config(block_dim=AREA)
     for n in range(count * AREA):
         t = n // AREA
@@ -301,7 +338,7 @@ def blend(
         depth = 0.0
         e = starts[t]
         end = starts[t + 1]
-        while e < end and T >= T_MIN:
+        while e < end and t_min <= T:
             row = PACKED * ids[e]
             dx = x - packed[row]
             dy = y - packed[row + 1]

@@ -23,9 +23,9 @@ MOMENT_PLANES = 5
 
 _HALF = WINDOW_PIXELS // 2
 _OFFSETS = np.arange(WINDOW_PIXELS) - _HALF
-_WEIGHTS = np.exp(-0.5 * (_OFFSETS / 1.5) ** 2)
-_WEIGHTS = (_WEIGHTS / _WEIGHTS.sum()).astype(np.float32)
-_C1, _C2 = np.float32(0.01**2), np.float32(0.03**2)
+WINDOW_WEIGHTS = np.exp(-0.5 * (_OFFSETS / 1.5) ** 2)
+WINDOW_WEIGHTS = (WINDOW_WEIGHTS / WINDOW_WEIGHTS.sum()).astype(np.float32)
+C1, C2 = np.float32(0.01**2), np.float32(0.03**2)
 
 
 @njit(parallel=True, **FAST)
@@ -59,7 +59,7 @@ def add_ssim_gradient(
         out = moments[ch, :, y]
         out[:] = np.float32(0)
         for k in range(WINDOW_PIXELS):
-            w = _WEIGHTS[k]
+            w = WINDOW_WEIGHTS[k]
             for i in range(width - 2 * _HALF):
                 a, b = x[i + k], p[i + k]
                 out[0, _HALF + i] += w * a
@@ -75,7 +75,7 @@ def add_ssim_gradient(
             continue
         sums = np.zeros((MOMENT_PLANES, width), np.float32)
         for k in range(WINDOW_PIXELS):
-            w = _WEIGHTS[k]
+            w = WINDOW_WEIGHTS[k]
             for j in range(MOMENT_PLANES):
                 source = moments[ch, j, y + k - _HALF]
                 for i in range(width):
@@ -83,10 +83,10 @@ def add_ssim_gradient(
         by = np.zeros((3, width), np.float32)
         for i in range(_HALF, width - _HALF):
             mx, my = sums[0, i], sums[1, i]
-            a1 = np.float32(2) * mx * my + _C1
-            a2 = np.float32(2) * (sums[4, i] - mx * my) + _C2
-            b1 = mx * mx + my * my + _C1
-            b2 = sums[2, i] - mx * mx + sums[3, i] - my * my + _C2
+            a1 = np.float32(2) * mx * my + C1
+            a2 = np.float32(2) * (sums[4, i] - mx * my) + C2
+            b1 = mx * mx + my * my + C1
+            b2 = sums[2, i] - mx * mx + sums[3, i] - my * my + C2
             per = np.float32(1) / (b1 * b2)
             similarity = a1 * a2 * per
             by_square = -similarity / b2
@@ -99,7 +99,7 @@ def add_ssim_gradient(
             by[1, i] = by_square
             by[2, i] = by_product
         for k in range(WINDOW_PIXELS):
-            w = _WEIGHTS[k]
+            w = WINDOW_WEIGHTS[k]
             for j in range(3):
                 for i in range(width - 2 * _HALF):
                     result[j, i + k] += w * by[j, _HALF + i]
@@ -107,7 +107,7 @@ def add_ssim_gradient(
         ch, y = row // height, row % height
         total = np.zeros((3, width), np.float32)
         for k in range(max(0, _HALF - y), min(WINDOW_PIXELS, height - y + _HALF)):
-            w = _WEIGHTS[k]
+            w = WINDOW_WEIGHTS[k]
             for j in range(3):
                 source = moment_slopes[ch, j, y + k - _HALF]
                 for i in range(width):

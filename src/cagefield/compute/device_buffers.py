@@ -1,0 +1,49 @@
+"""Arrays on the compute device that one owner reuses from call to call."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.compute.quadrants import qd
+
+_TYPES = {np.dtype(np.float32): qd.f32, np.dtype(np.int32): qd.i32, np.dtype(np.uint8): qd.u8}
+
+
+class DeviceBuffers:
+    """Flat device arrays by name; contents are valid until the same name is taken again."""
+
+    def __init__(self) -> None:
+        self._arrays: dict[str, tuple[Any, int, Any]] = {}
+
+    def take(self, name: str, size: int, dtype: Any = np.float32) -> Any:
+        """Uninitialized array of at least `size` values, float32, int32 or uint8.
+
+        The memory stays the same as long as it is large enough; otherwise it grows by a quarter more than
+        needed.
+        """
+        found = self._arrays.get(name)
+        if found is None or found[1] < size or found[2] != dtype:
+            room = max(1, size if found is None else size + size // 4)
+            self._arrays.pop(name, None)
+            found = self._arrays[name] = (empty_array(room, dtype), room, dtype)
+        return found[0]
+
+    def upload(self, name: str, values: NDArray[Any]) -> Any:
+        """Array of exactly the values, flattened; new memory where their number changes."""
+        flat = np.ascontiguousarray(values).reshape(-1)
+        if flat.size == 0:
+            flat = np.zeros(1, flat.dtype)
+        found = self._arrays.get(name)
+        if found is None or found[1] != flat.size or found[2] != flat.dtype:
+            self._arrays.pop(name, None)
+            found = self._arrays[name] = (empty_array(flat.size, flat.dtype), flat.size, flat.dtype)
+        found[0].from_numpy(flat)
+        return found[0]
+
+
+def empty_array(size: int, dtype: Any = np.float32) -> Any:
+    """Uninitialized flat array on the device, of at least one value."""
+    return qd.ndarray(dtype=_TYPES[np.dtype(dtype)], shape=(max(1, size),))
