@@ -62,14 +62,14 @@ class Elements:
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Spatial index of the positions."""
+        """Spatial index of the positions, of many queries."""
         return cKDTree(self.positions)
 
     def nearest(self, point: Array) -> int:
         """Number of the element nearest to a canonical point [3]. Raises CagefieldError without elements."""
         if not len(self):
             raise CagefieldError("the field has nothing to select: all of it is transparent")
-        return int(self.tree.query(point)[1])
+        return int(np.argmin(((self.positions - point) ** 2).sum(axis=1)))
 
     def attribute(self, name: Attribute) -> Float32:
         """Values [N] of an attribute: "size" in world units, all others in [0,1].

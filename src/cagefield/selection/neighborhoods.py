@@ -67,6 +67,11 @@ def flood(
     return _in_cells(elements, labels == labels[tuple(cell)])
 
 
+def interior(elements: Elements, mask: Mask) -> Mask:
+    """Mask [N] of the selected elements in cells whose neighbors across all six faces are selected too."""
+    return mask & _in_cells(elements, ndimage.binary_erosion(_occupied(elements, mask)))
+
+
 def _occupied(elements: Elements, mask: Mask) -> Mask:
     """[X,Y,Z], True where a cell has a selected element."""
     out = np.zeros(elements.occupancy.shape, bool)

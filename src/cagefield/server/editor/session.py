@@ -17,8 +17,9 @@ from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
+from cagefield.selection.element_selection import Mode, Selection
 from cagefield.server.editor.active_drags import Drags
-from cagefield.server.editor.cage_placement import cage_pair_around, outer_cage_around
+from cagefield.server.editor.cage_placement import cage_pair_around, outer_cage_around, outer_cage_of_box
 from cagefield.server.editor.document import Document, Entry
 from cagefield.server.editor.drag_solver import Moved, Target, move
 from cagefield.server.editor.edit_kinds import Kind, with_kind, with_options, with_outer, with_shell
@@ -84,7 +85,7 @@ class Session:
     @property
     def saved(self) -> bool:
         """True where the document is as it was last saved."""
-        return self.document == self._saved
+        return self.document.saved_part == self._saved
 
     def problem(self, edit: Edit) -> str | None:
         """Why an edit cannot be shown, or None; remembered for the edits that were asked about last."""
@@ -223,6 +224,26 @@ class Session:
         outer = outer_cage_around(entry.edit, margin)
         self._put(f"Outer margin{suffix_for(entry)}", replace(entry, edit=with_outer(entry.edit, outer)))
 
+    # ---- selected elements ----
+
+    def pick(self, label: str, picked: Selection, mode: Mode = "replace") -> None:
+        """The selection after elements were picked; an entry of the history where it changes."""
+        before = self.document.selection or Selection.none(picked.total)
+        after = before.combine(picked, mode)
+        self.select_elements(label, after)
+
+    def select_elements(self, label: str, selection: Selection | None) -> None:
+        """Another selection of elements; an entry of the history where it changes."""
+        selection = selection or None
+        if selection != self.document.selection:
+            self._push(label, replace(self.document, selection=selection))
+
+    def place_around_selection(self, inner: Cage) -> int:
+        """The number of a new continuous edit, selected, its inner cage around the selected elements."""
+        outer = outer_cage_of_box(inner)
+        edit = Edit.continuous(inner, outer, name=fresh_name(self.document, "edit"), lattice=LATTICE)
+        return self._add("Cage around the selection", edit)
+
     # ---- options and the list ----
 
     def change(
@@ -355,7 +376,7 @@ class Session:
 
     def mark_saved(self) -> None:
         """Mark the present document as saved."""
-        self._saved = self.document
+        self._saved = self.document.saved_part
         self.revision += 1
 
     # ---- inside ----

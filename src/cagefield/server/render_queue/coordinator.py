@@ -23,6 +23,7 @@ from cagefield.server.render_queue.background import BackgroundWork
 from cagefield.server.render_queue.binary_messages import edits_message, picture_message
 from cagefield.server.render_queue.damage import WHOLE, Rect, screen_bounds
 from cagefield.server.render_queue.dispatcher import BackgroundTask, Dispatcher, Stamp, TooManyError
+from cagefield.server.render_queue.highlights import Highlights
 from cagefield.server.render_queue.patch_extent import PatchExtent
 from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_queue.splat_extent import splat_extent
@@ -81,6 +82,7 @@ class Coordinator:
         worker.files, worker.write_opened = store.files, store.write_opened
         worker.background = store.scene.background
         self.background = BackgroundWork(session, store, self._measured, self.broadcast)
+        self.highlights = Highlights(session, self._numbered_shown, self._send_highlight)
         self.greeting: str | None = None
         """A line for the pages that come."""
         self._replaced: str | None = None
@@ -122,6 +124,8 @@ class Coordinator:
         page.send_queue.put(self.background.preparing())
         for job in self.background.jobs():
             page.send_queue.put(job)
+        if self.highlights.message is not None:
+            page.send_queue.put_highlight(self.highlights.message)
         return page
 
     def leave(self, page: Page) -> None:
@@ -300,7 +304,16 @@ class Coordinator:
 
     def background_task(self) -> BackgroundTask | None:
         """Next background task while no page waits for an image, or None."""
-        return self.background.next(self.dispatcher.scheduler.generation)
+        generation = self.dispatcher.scheduler.generation
+        return self.highlights.next(generation) or self.background.next(generation)
+
+    def _numbered_shown(self) -> tuple[int, Shown]:
+        """Number of the pictures' revision, and its content."""
+        return self._pictures, self._shown
+
+    def _send_highlight(self, content: bytes) -> None:
+        for page in self.pages.values():
+            page.send_queue.put_highlight(content)
 
     def _tell_preview(self) -> None:
         """Tells the pages which preview is over, and which has begun."""

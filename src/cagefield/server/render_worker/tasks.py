@@ -12,6 +12,7 @@ from cagefield.cameras.keyframes import Still
 from cagefield.edits import Edit
 from cagefield.geometry.cage import Cage
 from cagefield.server.render_worker.refinement import Refinement
+from cagefield.server.render_worker.selection_tasks import SelectionTask
 from cagefield.server.render_worker.view import Display, Region
 
 
@@ -206,6 +207,7 @@ Task: TypeAlias = (
     | EndJobTask
     | PageFieldTask
     | PageEditsTask
+    | SelectionTask
 )
 
 
