@@ -212,7 +212,7 @@ def test_only_the_visible_surface_is_picked(field: VoxelField | SplatField) -> N
     seen = deformed_positions(elements.positions, EditStack())
     everything = Rectangle((0.0, 0.0), (1.0, 1.0))
     visible = elements_in_region(
-        everything, camera, seen, len(elements), depth=depth, tolerance=2.0 * elements.cell_edge
+        everything, camera, seen, len(elements), depth=depth, tolerance=np.full(len(elements), 2.0 * elements.cell_edge)
     )
     through = elements_in_region(everything, camera, seen, len(elements))
     assert through.all()

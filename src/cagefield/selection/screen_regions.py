@@ -115,12 +115,12 @@ def elements_in_region(
     count: int,
     *,
     depth: Float32 | None = None,
-    tolerance: float = 0.0,
+    tolerance: Array | float = 0.0,
 ) -> Mask:
     """Mask [count] of the elements with a position in a region of the camera's image.
 
     `depth` [H,W] is the distance along the unit ray of each pixel of that image, infinite where most light
-    passes: only positions at most `tolerance`, world units, behind it count; None takes all that is behind
+    passes: only positions at most `tolerance`, world units, one or one for each position, behind it count; None takes all that is behind
     the region. A position is compared with the furthest depth of the pixels around its own, so that edges of
     a surface count.
     """
@@ -135,7 +135,8 @@ def elements_in_region(
                 f"depth must be [{camera.height}, {camera.width}] like the image, got {list(depth.shape)}"
             )
         distance = np.linalg.norm(positions.points[rows] - camera.origin, axis=1)
-        rows = rows[distance <= _furthest_around(depth)[y, x] + tolerance]
+        reach = np.broadcast_to(np.asarray(tolerance, np.float64), len(positions.points))[rows]
+        rows = rows[distance <= _furthest_around(depth)[y, x] + reach]
     out = np.zeros(count, bool)
     out[positions.element[rows]] = True
     return out

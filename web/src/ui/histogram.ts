@@ -7,6 +7,7 @@ type Attribute = NonNullable<Ask["attribute"]>;
 
 const ATTRIBUTES: Attribute[] = ["opacity", "size", "hue", "saturation", "value", "red", "green", "blue"];
 
+const SVG = "http://www.w3.org/2000/svg";
 const WIDTH = 268;
 const HEIGHT = 64;
 
@@ -16,14 +17,22 @@ export function histogram(app: App): HTMLElement {
     { ariaLabel: "Attribute of the histogram" },
     ...ATTRIBUTES.map((name) => h("option", { value: name }, name)),
   );
-  const canvas = h("canvas", { width: WIDTH, height: HEIGHT, title: "Drag over it to select a range" });
+  const chart = document.createElementNS(SVG, "svg");
+  chart.setAttribute("viewBox", `0 0 ${WIDTH} ${HEIGHT}`);
+  chart.setAttribute("preserveAspectRatio", "none");
+  const [all, chosen, between] = ["all", "chosen", "between"].map((name) => {
+    const path = document.createElementNS(SVG, "path");
+    path.setAttribute("class", name);
+    return path;
+  });
+  chart.append(all, chosen, between);
   const range = h("span", { class: "quiet range" });
   const whole = h(
     "details",
     { class: "histogram" },
     h("summary", {}, "By attribute"),
-    h("div", { class: "row" }, choice, range),
-    canvas,
+    h("div", { class: "row", title: "Drag over the bars to select a range" }, choice, range),
+    chart,
   );
   let counts: HistogramCounts | null = null;
   let dragged: [number, number] | null = null;
@@ -43,25 +52,12 @@ export function histogram(app: App): HTMLElement {
     });
   };
   const draw = (): void => {
-    const context = canvas.getContext("2d")!;
-    context.clearRect(0, 0, WIDTH, HEIGHT);
-    range.textContent = "";
-    if (counts === null) return;
-    const most = Math.log1p(Math.max(...counts.counts, 1));
-    const step = WIDTH / counts.counts.length;
-    const bar = (count: number, n: number): void => {
-      const height = (Math.log1p(count) / most) * (HEIGHT - 2);
-      context.fillRect(n * step, HEIGHT - height, step - 1, height);
-    };
-    context.fillStyle = "#5d6673";
-    counts.counts.forEach(bar);
-    context.fillStyle = "#ff9a2b";
-    counts.selected.forEach(bar);
-    if (dragged === null) return;
-    const [a, b] = [Math.min(...dragged), Math.max(...dragged)];
-    context.fillStyle = "#4c9ffe44";
-    context.fillRect(a * WIDTH, 0, (b - a) * WIDTH, HEIGHT);
-    range.textContent = `${short(valueAt(a))} to ${short(valueAt(b))}`;
+    all.setAttribute("d", counts === null ? "" : bars(counts.counts, counts.counts));
+    chosen.setAttribute("d", counts === null ? "" : bars(counts.selected, counts.counts));
+    const [a, b] = dragged === null ? [0, 0] : [Math.min(...dragged), Math.max(...dragged)];
+    between.setAttribute("d", `M${a * WIDTH} 0H${b * WIDTH}V${HEIGHT}H${a * WIDTH}Z`);
+    range.textContent =
+      dragged === null || counts === null ? "" : `${short(valueAt(a))} to ${short(valueAt(b))}`;
   };
   const valueAt = (share: number): number => {
     const { low, high } = counts!;
@@ -69,21 +65,21 @@ export function histogram(app: App): HTMLElement {
     return attribute() === "size" ? low * (high / low) ** share : low + (high - low) * share;
   };
   const place = (event: PointerEvent): number => {
-    const box = canvas.getBoundingClientRect();
+    const box = chart.getBoundingClientRect();
     return Math.min(1, Math.max(0, (event.clientX - box.left) / box.width));
   };
-  canvas.onpointerdown = (event) => {
+  chart.onpointerdown = (event) => {
     if (counts === null) return;
-    canvas.setPointerCapture(event.pointerId);
+    chart.setPointerCapture(event.pointerId);
     dragged = [place(event), place(event)];
     draw();
   };
-  canvas.onpointermove = (event) => {
+  chart.onpointermove = (event) => {
     if (dragged === null) return;
     dragged[1] = place(event);
     draw();
   };
-  canvas.onpointerup = () => {
+  chart.onpointerup = () => {
     if (dragged === null || counts === null) return;
     const [low, high] = [Math.min(...dragged), Math.max(...dragged)].map(valueAt);
     dragged = null;
@@ -109,4 +105,16 @@ export function histogram(app: App): HTMLElement {
 
 function short(value: number): string {
   return Number(value.toPrecision(3)).toString();
+}
+
+/** Path of the bars of some counts; heights are logarithmic, the highest of `scale` fills the chart. */
+function bars(counts: number[], scale: number[]): string {
+  const most = Math.log1p(Math.max(...scale, 1));
+  const step = WIDTH / counts.length;
+  return counts
+    .map((count, n) => {
+      const height = (Math.log1p(count) / most) * (HEIGHT - 2);
+      return `M${n * step} ${HEIGHT}v${-height}h${step - 1}v${height}Z`;
+    })
+    .join("");
 }
