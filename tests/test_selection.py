@@ -211,9 +211,8 @@ def test_only_the_visible_surface_is_picked(field: VoxelField | SplatField) -> N
     depth = np.where(frame.opacity > 0.5, frame.depth, np.inf).astype(np.float32)
     seen = deformed_positions(elements.positions, EditStack())
     everything = Rectangle((0.0, 0.0), (1.0, 1.0))
-    visible = elements_in_region(
-        everything, camera, seen, len(elements), depth=depth, tolerance=np.full(len(elements), 2.0 * elements.cell_edge)
-    )
+    tolerance = np.full(len(elements), 2.0 * elements.cell_edge)
+    visible = elements_in_region(everything, camera, seen, len(elements), depth=depth, tolerance=tolerance)
     through = elements_in_region(everything, camera, seen, len(elements))
     assert through.all()
     front = elements.positions[:, 1] < 0.0

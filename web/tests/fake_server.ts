@@ -47,6 +47,7 @@ export function state(change: Partial<State> = {}): State {
     keys: [],
     loop: false,
     selection: null,
+    isolated: false,
     ...change,
   };
 }

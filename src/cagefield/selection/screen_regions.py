@@ -120,9 +120,9 @@ def elements_in_region(
     """Mask [count] of the elements with a position in a region of the camera's image.
 
     `depth` [H,W] is the distance along the unit ray of each pixel of that image, infinite where most light
-    passes: only positions at most `tolerance`, world units, one or one for each position, behind it count; None takes all that is behind
-    the region. A position is compared with the furthest depth of the pixels around its own, so that edges of
-    a surface count.
+    passes: only positions at most `tolerance` behind it count, world units, one or one for each position.
+    None takes all that is behind the region. A position is compared with the furthest depth of the pixels
+    around its own, so that edges of a surface count.
     """
     at = pixels_of(camera, positions.points)
     rows = np.flatnonzero(at[:, 0] >= 0)

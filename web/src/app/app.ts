@@ -225,7 +225,7 @@ export class App {
     this.lines.set(segments);
     this.handles.set(dots);
     const { selection } = now.state ?? { selection: null };
-    this.highlight.visible = selection !== null && this.drag === null && now.preview === null && !now.before;
+    this.highlight.draw(selection !== null && this.drag === null && now.preview === null && !now.before);
     const hasGizmo = now.tool !== "select" || now.corners.length > 0;
     const isMovable = edit !== null && dragObstacle(now, edit) === null && now.selecting === null;
     if (!isMovable || !showsCages(now) || !hasGizmo) {

@@ -56,6 +56,11 @@ export class Actions {
     this.app.send({ type: "change_selection", change });
   }
 
+  /** Shows the selected elements alone, or all again. */
+  toggleIsolated(): void {
+    this.app.send({ type: "isolate", on: this.app.store.now.state?.isolated !== true });
+  }
+
   /** Makes an edit whose inner cage holds the selected elements; `margin` in cells. */
   encloseSelection(margin?: number): void {
     if (this.app.store.now.state?.selection == null)

@@ -29,27 +29,27 @@ import type { Pictures } from "../frames/pictures";
 import type { Viewport } from "../frames/viewport";
 import type { HighlightHeader } from "../net/protocol";
 
-/** Size of the square of a splat's center, CSS pixels. */
-const SPLAT_PIXELS = 5;
+/** Least size of an element's square, CSS pixels. */
+const MIN_PIXELS = 3;
 
 /** Least slack of the comparison of distances, as a share of the distance. */
 const DISTANCE_SLACK = 0.004;
 
-/** Slack in edges of a cell: centers of cells lie behind the surface. */
-const CELL_SLACK = 1.5;
+/** Slack in sizes of elements: centers lie behind the surface, at grazing angles far along the ray. */
+const SIZE_SLACK = 2.5;
 
 const POINT_VERTEX = `
 uniform vec3 low;
 uniform vec3 high;
 uniform float edge;
-uniform float splatPixels;
+uniform float minPixels;
 uniform float viewHeight;
 out vec3 world;
 void main() {
   world = mix(low, high, position);
   gl_Position = projectionMatrix * viewMatrix * vec4(world, 1.0);
   float covered = edge * projectionMatrix[1][1] * 0.5 * viewHeight / max(gl_Position.w, 1e-6);
-  gl_PointSize = edge > 0.0 ? max(1.2 * covered, 2.0) : splatPixels;
+  gl_PointSize = max(1.2 * covered, minPixels);
 }`;
 const POINT_FRAGMENT = `
 uniform sampler2D depthMap;
@@ -94,8 +94,6 @@ void main() {
 }`;
 
 export class Highlight {
-  /** Whether the highlight is drawn. */
-  visible = false;
   private readonly geometry = new BufferGeometry();
   private readonly points: Points<BufferGeometry, ShaderMaterial>;
   private readonly pointScene = new Scene();
@@ -124,7 +122,7 @@ export class Highlight {
           low: { value: new Vector3() },
           high: { value: new Vector3() },
           edge: { value: 0 },
-          splatPixels: { value: SPLAT_PIXELS },
+          minPixels: { value: MIN_PIXELS },
           viewHeight: { value: 1 },
           depthMap: { value: pictures.depthTexture },
           pictureProjection: { value: new Matrix4() },
@@ -150,7 +148,6 @@ export class Highlight {
     this.tint.frustumCulled = false;
     this.tint.visible = false;
     viewport.scene.add(this.tint);
-    viewport.beforeFrame.push(() => this.draw());
     viewport.canvas.addEventListener("webglcontextlost", () => {
       this.mask?.dispose();
       this.mask = null;
@@ -168,7 +165,7 @@ export class Highlight {
     (uniforms.low.value as Vector3).set(...header.low);
     (uniforms.high.value as Vector3).set(...header.high);
     uniforms.edge.value = header.size;
-    uniforms.slack.value = CELL_SLACK * header.size;
+    uniforms.slack.value = SIZE_SLACK * header.size;
     this.viewport.invalidate();
   }
 
@@ -177,10 +174,10 @@ export class Highlight {
     return this.tint.visible ? this.count : 0;
   }
 
-  /** Draws the mask for the current camera. */
-  private draw(): void {
+  /** Draws the mask for the current camera, before a frame; hides the highlight where it is not `visible`. */
+  draw(visible: boolean): void {
     const { viewpoint } = this.pictures;
-    this.tint.visible = this.visible && this.count > 0 && viewpoint !== null;
+    this.tint.visible = visible && this.count > 0 && viewpoint !== null;
     if (!this.tint.visible || viewpoint === null) return;
     const { renderer, camera } = this.viewport;
     const { width, height } = this.viewport.pixels;
@@ -188,7 +185,7 @@ export class Highlight {
     (uniforms.pictureProjection.value as Matrix4).copy(viewpoint.viewProjection);
     (uniforms.pictureEye.value as Vector3).copy(viewpoint.eye);
     uniforms.viewHeight.value = height;
-    uniforms.splatPixels.value = SPLAT_PIXELS * renderer.getPixelRatio();
+    uniforms.minPixels.value = MIN_PIXELS * renderer.getPixelRatio();
     const mask = this.sizedMask(width, height);
     (this.tint.material.uniforms.step_.value as Vector2).setScalar(
       Math.max(1, Math.round(renderer.getPixelRatio())),

@@ -93,6 +93,12 @@ export function bindings(
       action: "Enclose the selection in a new cage",
       run: () => actions.encloseSelection(),
     },
+    {
+      group: "Selection",
+      keys: ["/"],
+      action: "Isolate the selection, or show everything again",
+      run: () => actions.toggleIsolated(),
+    },
     { group: "Edits", keys: ["D"], action: "Discrete or continuous", run: () => actions.toggleKind() },
     {
       group: "Edits",

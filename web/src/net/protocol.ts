@@ -46,7 +46,8 @@ export type PageMessage =
   | SelectFlood
   | SelectFloaters
   | ChangeSelection
-  | SelectionCage;
+  | SelectionCage
+  | Isolate;
 export type ServerMessage = Hello | State | Dragged | Answer | Notice | Preview | Preparing | Job;
 
 /**
@@ -249,6 +250,13 @@ export interface FitInner {
 export interface GoTo {
   type: "go_to";
   entry: number;
+}
+/**
+ * Shows the selected elements alone, on all pages, or all again.
+ */
+export interface Isolate {
+  type: "isolate";
+  on: boolean;
 }
 /**
  * A keyframe of a camera path: a camera, and how far each edit has gone (1 where it is not named).
@@ -593,6 +601,7 @@ export interface State {
   keys: Key[];
   loop: boolean;
   selection: SelectionCount | null;
+  isolated: boolean;
 }
 /**
  * Heads a binary message: uint32 (little endian) length of this JSON, the JSON, the picture, the depth.

@@ -60,6 +60,9 @@ export function selectionPanel(app: App, actions: Actions): HTMLElement {
   const enclose = button("Cage around it", "A new edit with a cage around the selection (E)", "enclose", () =>
     actions.encloseSelection(model.margin),
   );
+  const isolate = button("Isolate", "Show the selection alone, or all again (/)", "isolate", () =>
+    actions.toggleIsolated(),
+  );
   const chart = histogram(app);
   const whole = section(
     "Selection",
@@ -77,6 +80,7 @@ export function selectionPanel(app: App, actions: Actions): HTMLElement {
       { class: "bar" },
       button("Floaters", "Select probable floaters", "floaters", selectFloaters),
       enclose,
+      isolate,
     ),
     chart,
   );
@@ -100,6 +104,8 @@ export function selectionPanel(app: App, actions: Actions): HTMLElement {
       selection === null
         ? `No ${noun} are selected: brush (M), lasso (J), or Shift+drag.`
         : `${selection.count.toLocaleString("en")} of ${selection.total.toLocaleString("en")} ${noun} selected`;
+    isolate.disabled = selection === null && state?.isolated !== true;
+    isolate.textContent = state?.isolated === true ? "Show all" : "Isolate";
     for (const each of [...needSelected, enclose]) each.disabled = selection === null;
   });
   return whole;

@@ -37,6 +37,8 @@ from cagefield.typing import Array
 LATTICE = 64
 """Lattice nodes along an axis of a new continuous edit."""
 
+NOTHING_SELECTED = "nothing is selected; paint with the brush (M), or drag a lasso (J) around it"
+
 
 class Session:
     """The document with its history, the selection, and the drags that go on."""
@@ -60,6 +62,8 @@ class Session:
         self.drags = Drags()
         self.preview: Preview | None = None
         """Preview that a page plays; ends with the next change of the document or drag."""
+        self.isolated: Selection | None = None
+        """The only elements that pictures show, None for all; no entry of the history."""
         self.revision = 1
         self._saved: Document | None = document
         self._next = max((entry.id for entry in document.entries), default=0) + 1
@@ -237,6 +241,13 @@ class Session:
         selection = selection or None
         if selection != self.document.selection:
             self._push(label, replace(self.document, selection=selection))
+
+    def isolate(self, on: bool) -> None:
+        """Show the selected elements alone, on all pages, or all again. Raises EditError without any."""
+        if on and self.document.selection is None:
+            raise EditError(NOTHING_SELECTED)
+        self.isolated = self.document.selection if on else None
+        self.revision += 1
 
     def place_around_selection(self, inner: Cage) -> int:
         """The number of a new continuous edit, selected, its inner cage around the selected elements."""

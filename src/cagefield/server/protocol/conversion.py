@@ -149,6 +149,7 @@ def state_of(
         ],
         loop=document.loop,
         selection=_count_of(document.selection),
+        isolated=session.isolated is not None,
     )
 
 

@@ -84,6 +84,13 @@ class SelectionCage(Message):
     """Distance from the elements to the cage, cells of the occupancy grid."""
 
 
+class Isolate(Message):
+    """Shows the selected elements alone, on all pages, or all again."""
+
+    type: Literal["isolate"] = "isolate"
+    on: bool
+
+
 SelectionMessage: TypeAlias = (
-    SelectRegion | SelectRange | SelectFlood | SelectFloaters | ChangeSelection | SelectionCage
+    SelectRegion | SelectRange | SelectFlood | SelectFloaters | ChangeSelection | SelectionCage | Isolate
 )

@@ -109,6 +109,8 @@ class State(Message):
     loop: bool
     selection: SelectionCount | None
     """Selected elements of the field; None for none."""
+    isolated: bool
+    """True where pictures show isolated elements alone."""
 
     def redundancy_key(self) -> str:
         return self.type
@@ -288,4 +290,4 @@ class HighlightHeader(Message):
     low: Vec3
     high: Vec3
     size: float
-    """Edge of a cell, world units; 0 for splats, whose centers are shown."""
+    """Edge of the square that shows an element, world units."""

@@ -13,6 +13,7 @@ import numpy as np
 from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack
 from cagefield.fields.splat_field import SplatField
+from cagefield.selection.element_selection import Selection
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import server_messages
@@ -38,6 +39,9 @@ from cagefield.server.render_worker.tasks import (
     values_of,
 )
 from cagefield.server.render_worker.view import Display
+
+Options = tuple[bool, Selection | None]
+"""Options that change all of a picture: the opacity choice, and isolated elements."""
 
 
 @dataclass
@@ -95,8 +99,8 @@ class Coordinator:
         self._pictured = session.revision
         """The first revision that is shown as `_shown`."""
         self._pictures = 0
-        self._stacks: dict[int, tuple[EditStack, bool]] = {}
-        """The edits and the opacity choice of pictures' revisions, of those that pages may still show."""
+        self._stacks: dict[int, tuple[EditStack, Options]] = {}
+        """The edits and the options of pictures' revisions, of those that pages may still show."""
         self._trouble: str | None = None
         self._asking: set[int] = set()
         """Pages of which a picture is made for a download."""
@@ -282,8 +286,8 @@ class Coordinator:
         stacks = [self._stack(revision) for revision in (one, another)]
         if camera is None or None in stacks:
             return WHOLE
-        (before, opacity), (after, other) = (stack for stack in stacks if stack is not None)
-        if opacity != other:
+        (before, options), (after, others) = (stack for stack in stacks if stack is not None)
+        if options != others:
             return WHOLE
         beside = np.array([[-self.spread], [self.spread]])
         changed = after.changed_boxes(before, lambda step: self._patches.boxes(step.edit))
@@ -338,16 +342,21 @@ class Coordinator:
     def _measured(self) -> None:
         self.broadcast(self.state())
 
-    def _stack(self, revision: int) -> tuple[EditStack, bool] | None:
+    def _stack(self, revision: int) -> tuple[EditStack, Options] | None:
         if revision == self._pictures:
-            return EditStack(self._drawn), self._shown.preserve_opacity
+            return EditStack(self._drawn), _options_of(self._shown)
         return self._stacks.get(revision)
 
     def _keep_stack(self) -> None:
         """Store the shown stack before it changes."""
         wanted = self.dispatcher.scheduler.remembered()
         self._stacks = {number: stack for number, stack in self._stacks.items() if number in wanted}
-        self._stacks[self._pictures] = EditStack(self._drawn), self._shown.preserve_opacity
+        self._stacks[self._pictures] = EditStack(self._drawn), _options_of(self._shown)
 
     def _what_is_shown(self) -> Shown:
-        return Shown(values_of(self.session.drawn()), self.session.shown.preserve_opacity)
+        session = self.session
+        return Shown(values_of(session.drawn()), session.shown.preserve_opacity, session.isolated)
+
+
+def _options_of(shown: Shown) -> Options:
+    return shown.preserve_opacity, shown.isolated

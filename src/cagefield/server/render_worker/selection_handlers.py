@@ -57,7 +57,10 @@ class SelectionHandlers:
         Raises CagefieldError where there is none; `proceed` is called now and then, and cancels by raising.
         """
         if isinstance(task, PickTask):
-            return Selection.from_mask(self._picked(task.shown, task.pick))
+            picked = self._picked(task.shown, task.pick)
+            if task.shown.isolated is not None:
+                picked = picked & self._mask(task.shown.isolated)
+            return Selection.from_mask(picked)
         elements = self._elements
         if isinstance(task, HistogramTask):
             selected = np.zeros(len(elements), bool) if task.selection is None else self._mask(task.selection)
@@ -75,7 +78,10 @@ class SelectionHandlers:
         if elements.kind == "cells":
             mask = mask & ~interior(elements, mask)
         seen = self._positions(task.shown, np.flatnonzero(mask), proceed)
-        return _highlight(elements, seen.points)
+        size = elements.cell_edge
+        if elements.kind == "splats" and len(seen.element):
+            size = 2.0 * float(np.median(elements.radii[seen.element]))
+        return _highlight(seen.points, size)
 
     @property
     def _elements(self) -> Elements:
@@ -156,7 +162,7 @@ def _with_pixels(camera: Camera, most: int) -> Camera:
     return camera.resized(max(1, round(camera.width * scale)), max(1, round(camera.height * scale)))
 
 
-def _highlight(elements: Elements, points: Array) -> Highlight:
+def _highlight(points: Array, size: float) -> Highlight:
     if len(points) > MAX_HIGHLIGHT_POINTS:
         chosen = np.random.default_rng(0).choice(len(points), MAX_HIGHLIGHT_POINTS, replace=False)
         points = points[np.sort(chosen)]
@@ -164,7 +170,6 @@ def _highlight(elements: Elements, points: Array) -> Highlight:
     high = points.max(axis=0) if len(points) else np.ones(3)
     span = np.where(high > low, high - low, 1.0)
     quantized = np.round((points - low) / span * QUANTIZED_MAX).astype("<u2")
-    size = elements.cell_edge if elements.kind == "cells" else 0.0
     return Highlight(
         tuple(low.tolist()), tuple((low + span).tolist()), quantized.tobytes(), len(points), size
     )

@@ -115,7 +115,7 @@ class Highlight:
         low, high: corners of the box.
         points: uint16 (little endian) x, y, z of each position; 0 at `low`, 65535 at `high`.
         count: number of positions in `points`; a sample where there are too many.
-        size: edge of a cell, world units; 0 for splats, whose centers are shown.
+        size: edge of the square that shows an element, world units: of a cell or a typical selected splat.
     """
 
     low: tuple[float, float, float]

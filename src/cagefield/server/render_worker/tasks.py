@@ -11,6 +11,7 @@ from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Still
 from cagefield.edits import Edit
 from cagefield.geometry.cage import Cage
+from cagefield.selection.element_selection import Selection
 from cagefield.server.render_worker.refinement import Refinement
 from cagefield.server.render_worker.selection_tasks import SelectionTask
 from cagefield.server.render_worker.view import Display, Region
@@ -49,10 +50,14 @@ def values_of(edits: tuple[Edit, ...]) -> tuple[EditValues, ...]:
 
 @dataclass(frozen=True)
 class Shown:
-    """Content of an image: edits (see `values_of`) and the scene's opacity choice."""
+    """Content of an image: edits (see `values_of`), the scene's opacity choice, and isolated elements.
+
+    With `isolated` elements the field has no others, and edits show no patches and no pastes.
+    """
 
     edits: tuple[EditValues, ...]
     preserve_opacity: bool = True
+    isolated: Selection | None = None
 
 
 @dataclass(frozen=True)

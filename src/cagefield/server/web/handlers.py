@@ -292,6 +292,7 @@ class MessageHandlers:
     @_handles(selection_messages.SelectFloaters)
     @_handles(selection_messages.ChangeSelection)
     @_handles(selection_messages.SelectionCage)
+    @_handles(selection_messages.Isolate)
     async def _select_elements(self, message: selection_messages.SelectionMessage) -> None:
         await change_selection(self._coordinator, self._page, message)
         self._coordinator.changed()

@@ -9,6 +9,7 @@ from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage
 from cagefield.selection.element_selection import Selection
 from cagefield.selection.screen_regions import Lasso, Rectangle, Stroke
+from cagefield.server.editor.session import NOTHING_SELECTED
 from cagefield.server.protocol import selection_messages as messages
 from cagefield.server.protocol.server_messages import HistogramCounts
 from cagefield.server.render_queue.coordinator import Coordinator, Page
@@ -25,14 +26,14 @@ from cagefield.server.render_worker.selection_tasks import (
     RegionPick,
 )
 
-NOTHING_SELECTED = "nothing is selected; paint it with the brush (M), or drag a lasso (J) around it"
-
 _LABELS = {"all": "Select all", "grow": "Grow selection", "shrink": "Shrink selection"}
 
 
 async def change_selection(coordinator: Coordinator, page: Page, message: messages.SelectionMessage) -> None:
     """Follow a message about selected elements. Raises CagefieldError where it cannot be followed."""
-    if isinstance(message, messages.SelectionCage):
+    if isinstance(message, messages.Isolate):
+        coordinator.session.isolate(message.on)
+    elif isinstance(message, messages.SelectionCage):
         await _place_cage(coordinator, message.margin)
     elif isinstance(message, messages.ChangeSelection):
         await _change(coordinator, message)
