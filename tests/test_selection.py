@@ -19,7 +19,7 @@ from cagefield.rendering.renderers import renderer_of
 from cagefield.selection import Elements, Selection
 from cagefield.selection.deformed_positions import deformed_positions
 from cagefield.selection.elements import ATTRIBUTES, histogram
-from cagefield.selection.field_elements import MAX_CELLS_PER_AXIS, elements_of_field, without_elements
+from cagefield.selection.field_elements import MAX_GRID_CELLS, elements_of_field, without_elements
 from cagefield.selection.floaters import floaters
 from cagefield.selection.neighborhoods import flood, grow, interior, shrink
 from cagefield.selection.screen_regions import Lasso, Rectangle, Stroke, elements_in_region
@@ -59,7 +59,7 @@ def test_elements_of_voxels_are_the_dense_vertices() -> None:
 
 
 def test_fine_voxels_share_cells() -> None:
-    side = 2 * MAX_CELLS_PER_AXIS
+    side = 2 * MAX_GRID_CELLS
     linear = np.ravel_multi_index(np.array([[0, 0, 0], [1, 1, 1], [2, 0, 0]]).T, (side, 8, 8))
     density = np.array([50.0, 100.0, 200.0], np.float32)
     sh = np.array([[[1.0, 0, 0]], [[0, 0, 0]], [[0, 0, 0]]], np.float32)

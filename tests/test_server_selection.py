@@ -23,26 +23,26 @@ from cagefield.server.protocol.client_messages import page_messages
 from cagefield.server.protocol.conversion import state_of
 from cagefield.server.protocol.message_queues import SendQueue
 from cagefield.server.render_queue.highlights import Highlights
-from cagefield.server.render_worker.refinement import FINAL
-from cagefield.server.render_worker.renderer_cache import RendererCache
-from cagefield.server.render_worker.selection_tasks import (
-    BoxTask,
+from cagefield.server.render_worker.picks import (
     EveryPick,
     FloaterPick,
     FloodPick,
     Highlight,
-    HighlightTask,
-    HistogramTask,
     NeighborPick,
     Pick,
-    PickTask,
     RangePick,
     RegionPick,
 )
+from cagefield.server.render_worker.refinement import FINAL
+from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.task_handlers import TaskHandlers
 from cagefield.server.render_worker.tasks import (
     Answered,
+    BoxTask,
+    HighlightTask,
+    HistogramTask,
     PageEditsTask,
+    PickTask,
     PictureDone,
     PictureTask,
     Shown,

@@ -1,2 +1,11 @@
+from .bounding_cages import oriented_box as oriented_box
+from .cage_mesh import CageMesh as CageMesh
+from .cage_mesh import cage_mesh as cage_mesh
 from .element_selection import Selection as Selection
 from .elements import Elements as Elements
+from .field_elements import elements_of_field as elements_of_field
+from .field_elements import without_elements as without_elements
+from .floaters import floaters as floaters
+from .neighborhoods import flood as flood
+from .neighborhoods import grow as grow
+from .neighborhoods import shrink as shrink

@@ -30,6 +30,9 @@ UPRIGHT_GAIN = 0.97
 MIN_EDGE_SHARE = 1e-3
 """Shortest edge of a box, as a share of its longest: a flat selection gets a thin box."""
 
+OUTER_MARGIN_SHARE = 0.6
+"""Margin of an outer cage, in middle edges of the inner one."""
+
 
 def oriented_box(points: Array, *, margin: float = 0.0, radii: Array | float = 0.0) -> Cage:
     """Box around points [N,3] with a margin, world units; few outliers may be outside.
@@ -59,6 +62,12 @@ def oriented_box(points: Array, *, margin: float = 0.0, radii: Array | float = 0
     )
     low, high = low - thin, high + thin
     return Cage((low + hexahedron.BITS * (high - low)) @ axes.T)
+
+
+def outer_cage_of_box(inner: Cage) -> Cage:
+    """Outer cage of a box of any proportions: its margin is OUTER_MARGIN_SHARE of the box's middle edge."""
+    lengths = np.linalg.norm(inner.affine[0], axis=0)
+    return inner.grown(OUTER_MARGIN_SHARE * float(np.median(lengths)))
 
 
 def lattice_cells(cage: Cage, most: int = 4) -> tuple[int, int, int]:

@@ -18,7 +18,7 @@ from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.selection.elements import Elements
 from cagefield.typing import Array, Float32, Mask
 
-MAX_CELLS_PER_AXIS = 160
+MAX_GRID_CELLS = 160
 """Cells along the longest side of an occupancy grid: finer fields have several vertices in a cell."""
 
 MIN_CELL_OPTICAL_DEPTH = 0.05
@@ -61,7 +61,7 @@ def splat_elements(field: SplatField) -> Elements:
     """
     low, high = field.bounds
     longest = float((high - low).max())
-    edge = max(longest / MAX_CELLS_PER_AXIS, CELL_SPLAT_WIDTHS * field.sample_spacing)
+    edge = max(longest / MAX_GRID_CELLS, CELL_SPLAT_WIDTHS * field.sample_spacing)
     edge = min(edge, longest / 8.0)
     shape = tuple(int(n) for n in np.maximum(np.ceil((high - low) / edge), 1))
     cells = _cells_at(field.means, low, edge, shape)
@@ -118,7 +118,7 @@ def cell_elements(field: VoxelField) -> Elements:
 
 def block_vertices(field: VoxelField) -> int:
     """Vertices along the edge of a cell."""
-    return max(1, math.ceil(max(field.resolution) / MAX_CELLS_PER_AXIS))
+    return max(1, math.ceil(max(field.resolution) / MAX_GRID_CELLS))
 
 
 def cell_of_vertices(field: VoxelField) -> NDArray[np.int64]:

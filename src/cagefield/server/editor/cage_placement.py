@@ -34,12 +34,6 @@ def cage_pair_around(point: Array, view_height: float, bounds: Array, voxel: flo
     return inner, inner.grown(OUTER_CAGE_MARGIN_SHARE * edge)
 
 
-def outer_cage_of_box(inner: Cage) -> Cage:
-    """Outer cage of a box of any proportions: its margin is a share of the box's middle edge."""
-    lengths = np.linalg.norm(inner.affine[0], axis=0)
-    return inner.grown(OUTER_CAGE_MARGIN_SHARE * float(np.median(lengths)))
-
-
 def outer_cage_around(edit: Edit, margin: float) -> Cage:
     """The outer cage as a margin, world units, around the inner cage before and after its operations."""
     origin, edges = edit.inner.frame

@@ -17,9 +17,10 @@ from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
+from cagefield.selection.bounding_cages import outer_cage_of_box
 from cagefield.selection.element_selection import Mode, Selection
 from cagefield.server.editor.active_drags import Drags
-from cagefield.server.editor.cage_placement import cage_pair_around, outer_cage_around, outer_cage_of_box
+from cagefield.server.editor.cage_placement import cage_pair_around, outer_cage_around
 from cagefield.server.editor.document import Document, Entry
 from cagefield.server.editor.drag_solver import Moved, Target, move
 from cagefield.server.editor.edit_kinds import Kind, with_kind, with_options, with_outer, with_shell

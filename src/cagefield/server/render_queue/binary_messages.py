@@ -6,8 +6,8 @@ from cagefield.server.protocol import server_messages
 from cagefield.server.protocol.common import Message
 from cagefield.server.render_queue.dispatcher import Stamp
 from cagefield.server.render_queue.requests import EditsRequest, Request
+from cagefield.server.render_worker.picks import Highlight
 from cagefield.server.render_worker.refinement import FINAL
-from cagefield.server.render_worker.selection_tasks import Highlight
 from cagefield.server.render_worker.tasks import EditsDone, Failed, PictureDone
 
 

@@ -8,8 +8,7 @@ from cagefield.selection.element_selection import Selection
 from cagefield.server.editor.session import Session
 from cagefield.server.render_queue.binary_messages import highlight_message
 from cagefield.server.render_queue.dispatcher import BackgroundTask
-from cagefield.server.render_worker.selection_tasks import HighlightTask
-from cagefield.server.render_worker.tasks import Answered, Result, Shown, Stopped
+from cagefield.server.render_worker.tasks import Answered, HighlightTask, Result, Shown, Stopped
 
 
 class Highlights:

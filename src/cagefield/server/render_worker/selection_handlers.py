@@ -18,22 +18,18 @@ from cagefield.selection.field_elements import elements_of_field
 from cagefield.selection.floaters import floaters
 from cagefield.selection.neighborhoods import flood, grow, interior, shrink
 from cagefield.selection.screen_regions import elements_in_region
-from cagefield.server.render_worker.refinement import Refinement
-from cagefield.server.render_worker.renderer_cache import RendererCache
-from cagefield.server.render_worker.selection_tasks import (
-    BoxTask,
+from cagefield.server.render_worker.picks import (
     EveryPick,
     FloaterPick,
     FloodPick,
     Highlight,
-    HistogramTask,
     Pick,
-    PickTask,
     RangePick,
     RegionPick,
-    SelectionTask,
 )
-from cagefield.server.render_worker.tasks import Shown
+from cagefield.server.render_worker.refinement import Refinement
+from cagefield.server.render_worker.renderer_cache import RendererCache
+from cagefield.server.render_worker.tasks import BoxTask, HistogramTask, PickTask, SelectionTask, Shown
 from cagefield.typing import Array, Float32, Mask
 
 DEPTH_PIXELS = 120_000

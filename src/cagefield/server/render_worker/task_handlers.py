@@ -22,19 +22,22 @@ from cagefield.server.render_worker.page_files import PageFiles
 from cagefield.server.render_worker.refinement import Refinement
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.selection_handlers import SelectionHandlers
-from cagefield.server.render_worker.selection_tasks import BoxTask, HighlightTask, HistogramTask, PickTask
 from cagefield.server.render_worker.splat_density import dense_cells
 from cagefield.server.render_worker.tasks import (
     Answered,
+    BoxTask,
     EndJobTask,
     ErrorTask,
     FitTask,
     FrameTask,
     GridTask,
+    HighlightTask,
+    HistogramTask,
     LightTask,
     LookTask,
     PageEditsTask,
     PageFieldTask,
+    PickTask,
     PictureTask,
     Result,
     StillTask,

@@ -12,8 +12,9 @@ from cagefield.cameras.keyframes import Still
 from cagefield.edits import Edit
 from cagefield.geometry.cage import Cage
 from cagefield.selection.element_selection import Selection
+from cagefield.selection.elements import Attribute
+from cagefield.server.render_worker.picks import Pick
 from cagefield.server.render_worker.refinement import Refinement
-from cagefield.server.render_worker.selection_tasks import SelectionTask
 from cagefield.server.render_worker.view import Display, Region
 
 
@@ -197,6 +198,46 @@ class PageEditsTask:
     has: tuple[str, ...]
     generation: int
 
+
+@dataclass(frozen=True)
+class PickTask:
+    """Selection of the picked elements."""
+
+    number: int
+    shown: Shown
+    pick: Pick
+
+
+@dataclass(frozen=True)
+class HistogramTask:
+    """Histogram of an attribute, with the selected elements."""
+
+    number: int
+    attribute: Attribute
+    selection: Selection | None
+
+
+@dataclass(frozen=True)
+class BoxTask:
+    """Corners of an oriented box around the selected elements as edits show them; `margin` in cells."""
+
+    number: int
+    shown: Shown
+    selection: Selection
+    margin: float
+
+
+@dataclass(frozen=True)
+class HighlightTask:
+    """Positions at which the selected elements are seen; abandoned with its generation."""
+
+    number: int
+    shown: Shown
+    selection: Selection
+    generation: int
+
+
+SelectionTask: TypeAlias = PickTask | HistogramTask | BoxTask | HighlightTask
 
 Task: TypeAlias = (
     PictureTask

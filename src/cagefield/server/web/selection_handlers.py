@@ -13,18 +13,16 @@ from cagefield.server.editor.session import NOTHING_SELECTED
 from cagefield.server.protocol import selection_messages as messages
 from cagefield.server.protocol.server_messages import HistogramCounts
 from cagefield.server.render_queue.coordinator import Coordinator, Page
-from cagefield.server.render_worker.selection_tasks import (
-    BoxTask,
+from cagefield.server.render_worker.picks import (
     EveryPick,
     FloaterPick,
     FloodPick,
-    HistogramTask,
     NeighborPick,
     Pick,
-    PickTask,
     RangePick,
     RegionPick,
 )
+from cagefield.server.render_worker.tasks import BoxTask, HistogramTask, PickTask
 
 _LABELS = {"all": "Select all", "grow": "Grow selection", "shrink": "Shrink selection"}
 

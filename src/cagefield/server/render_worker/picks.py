@@ -1,17 +1,14 @@
-"""Tasks about selected elements, and the ways in which elements are picked; plain picklable values."""
+"""Ways in which elements are picked, and highlights of them; plain picklable values."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from cagefield.cameras.camera import Camera
 from cagefield.selection.element_selection import Selection
 from cagefield.selection.elements import Attribute
 from cagefield.selection.screen_regions import Lasso, Rectangle, Stroke
-
-if TYPE_CHECKING:
-    from cagefield.server.render_worker.tasks import Shown
 
 
 @dataclass(frozen=True)
@@ -64,47 +61,6 @@ class NeighborPick:
 
 
 Pick: TypeAlias = RegionPick | FloodPick | RangePick | FloaterPick | EveryPick | NeighborPick
-
-
-@dataclass(frozen=True)
-class PickTask:
-    """Selection of the picked elements."""
-
-    number: int
-    shown: Shown
-    pick: Pick
-
-
-@dataclass(frozen=True)
-class HistogramTask:
-    """Histogram of an attribute, with the selected elements."""
-
-    number: int
-    attribute: Attribute
-    selection: Selection | None
-
-
-@dataclass(frozen=True)
-class BoxTask:
-    """Corners of an oriented box around the selected elements as edits show them; `margin` in cells."""
-
-    number: int
-    shown: Shown
-    selection: Selection
-    margin: float
-
-
-@dataclass(frozen=True)
-class HighlightTask:
-    """Positions at which the selected elements are seen; abandoned with its generation."""
-
-    number: int
-    shown: Shown
-    selection: Selection
-    generation: int
-
-
-SelectionTask: TypeAlias = PickTask | HistogramTask | BoxTask | HighlightTask
 
 
 @dataclass(frozen=True)
