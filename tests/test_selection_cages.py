@@ -111,7 +111,7 @@ def test_the_mesh_is_closed_and_encloses_the_selection(faces: int, margin: float
     points = chance.normal(size=(1500, 3)) * (0.3, 0.1, 0.1)
     points[:, 2] += 2.0 * points[:, 0] ** 2
     mesh = cage_mesh(points, margin, max_faces=faces)
-    assert 0.3 * faces < len(mesh.faces) <= faces and mesh.margin >= margin
+    assert 0.3 * faces < len(mesh.faces) <= faces and margin <= mesh.margin < margin + 0.15
     assert_closed(mesh)
     np.testing.assert_allclose(winding_numbers(mesh, points), 1.0, atol=1e-6)
 
@@ -127,7 +127,8 @@ def test_a_hollow_selection_has_one_surface() -> None:
     assert len(mesh.vertices) - len(mesh.faces) // 2 == 2
     np.testing.assert_allclose(winding_numbers(mesh, np.zeros((1, 3))), 1.0, atol=1e-6)
     radius = np.linalg.norm(mesh.vertices, axis=1)
-    assert abs(radius - 1.0 - mesh.margin).max() < 0.05
+    # Half of a cell, the diagonal of one, and the corners that decimation cuts.
+    assert mesh.margin < 0.3 and abs(radius - 1.0 - mesh.margin).max() < 0.12
 
 
 def test_meshes_that_cannot_be() -> None:
@@ -136,5 +137,5 @@ def test_meshes_that_cannot_be() -> None:
         cage_mesh(np.zeros((0, 3)), 0.1)
     with pytest.raises(CagefieldError, match="margin"):
         cage_mesh(np.zeros((1, 3)), 0.0)
-    with pytest.raises(CagefieldError, match="3 faces are too few"):
+    with pytest.raises(CagefieldError, match=r"3 faces are too few.*allow 4 or more"):
         cage_mesh(np.zeros((1, 3)), 1.0, max_faces=3)

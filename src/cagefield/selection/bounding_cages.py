@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from cagefield.errors import CagefieldError
 from cagefield.geometry import hexahedron
 from cagefield.geometry.cage import Cage
-from cagefield.typing import Array
+from cagefield.typing import Array, Float32
 
 OUTLIER_QUANTILE = 0.005
 """Share of the positions on each side of the box that may be outliers."""
@@ -34,7 +34,7 @@ OUTER_MARGIN_SHARE = 0.6
 """Margin of an outer cage, in middle edges of the inner one."""
 
 
-def oriented_box(points: Array, *, margin: float = 0.0, radii: Array | float = 0.0) -> Cage:
+def oriented_box(points: Array, *, margin: float = 0.0, radii: Array | Float32 | float = 0.0) -> Cage:
     """Box around points [N,3] with a margin, world units; few outliers may be outside.
 
     A point counts as a ball of its radius, `radii` [N] or one for all. The box's axes are those nearest to

@@ -93,7 +93,7 @@ def cell_elements(field: VoxelField) -> Elements:
     total = np.bincount(slots, weights, len(linear))
     rgb = _mean_rgb(field.sh[dense])
     mean = np.stack([np.bincount(slots, weights * rgb[:, c], len(linear)) for c in range(3)], axis=1)
-    middle = cells * block + 0.5 * (block - 1)
+    middle: Array = (cells * block + 0.5 * (block - 1)).astype(np.float64)
     half = 0.5 * block
     spans = np.stack(
         [_world(field, middle + axis * half) - _world(field, middle - axis * half) for axis in np.eye(3)],
@@ -147,7 +147,7 @@ def without_elements(
     state[tuple(elements.cells[mask].T)] = -1
     near_removed = _grown(state == -1)
     cell = cell_of_vertices(field)
-    gone = (state == -1) | (near_removed & ~others)
+    gone: Mask = np.asarray((state == -1) | (near_removed & ~others))
     keep = ~gone.reshape(-1)[cell]
     return VoxelField(
         field.bounds,
@@ -222,7 +222,8 @@ def _sampled(
     order = np.lexsort((alpha.reshape(-1)[inside], key))
     last = np.append(key[order][1:] != key[order][:-1], True) if len(order) else np.zeros(0, bool)
     densest = order[last]
-    return np.bincount(cell[densest], _log_passed(alpha.reshape(-1)[inside][densest]), total)
+    passed = _log_passed(alpha.reshape(-1)[inside][densest])
+    return np.bincount(cell[densest], passed, total).astype(np.float64)
 
 
 def _log_passed(alpha: Float32 | Array) -> Array:

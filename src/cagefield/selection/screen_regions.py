@@ -26,8 +26,8 @@ Points = Sequence[tuple[float, float]]
 MAX_REGION_POINTS = 4096
 """Points of a lasso or a stroke, at most."""
 
-DEPTH_TOLERANCE = 1.5
-"""Elements count as visible up to so many cell edges behind the surface: half of a splat is behind it."""
+MAX_SHARE = 10
+"""Points of a region are at most so many widths or heights beside the image."""
 
 
 class Region(Protocol):
@@ -162,5 +162,7 @@ def _check(points: Points, noun: str, least: int) -> None:
         raise CagefieldError(
             f"a {noun} has {least} to {MAX_REGION_POINTS} points, got {len(points)}; draw it again"
         )
-    if not np.isfinite(np.array(points, dtype=np.float64)).all():
-        raise CagefieldError(f"points of a {noun} must be finite shares of the image")
+    if not (np.abs(np.array(points, dtype=np.float64)) <= MAX_SHARE).all():
+        raise CagefieldError(
+            f"points of a {noun} must be shares of the image from -{MAX_SHARE} to {MAX_SHARE}"
+        )

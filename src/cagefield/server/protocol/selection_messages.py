@@ -11,12 +11,13 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, FiniteFloat
 
-from cagefield.selection.screen_regions import MAX_REGION_POINTS
+from cagefield.selection.screen_regions import MAX_REGION_POINTS, MAX_SHARE
 from cagefield.server.protocol.common import Message
 
 ModeName: TypeAlias = Literal["replace", "add", "subtract", "intersect"]
 AttributeName: TypeAlias = Literal["size", "opacity", "red", "green", "blue", "hue", "saturation", "value"]
 Share: TypeAlias = Annotated[float, Field(ge=0, le=1)]
+Coordinate: TypeAlias = Annotated[float, Field(ge=-MAX_SHARE, le=MAX_SHARE)]
 
 
 class SelectRegion(Message):
@@ -27,9 +28,7 @@ class SelectRegion(Message):
 
     type: Literal["select_region"] = "select_region"
     shape: Literal["rectangle", "lasso", "brush"]
-    points: Annotated[
-        list[tuple[FiniteFloat, FiniteFloat]], Field(min_length=1, max_length=MAX_REGION_POINTS)
-    ]
+    points: Annotated[list[tuple[Coordinate, Coordinate]], Field(min_length=1, max_length=MAX_REGION_POINTS)]
     radius: Annotated[float, Field(gt=0, le=1)] = 0.03
     """Of a brush, a share of the picture's height."""
     mode: ModeName = "replace"
