@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage
 from cagefield.selection.bounding_cages import lattice_cells, oriented_box
-from cagefield.selection.cage_mesh import CageMesh, cage_mesh
+from cagefield.selection.enclosing_mesh import CageMesh, cage_mesh
 
 
 def box_points(size: tuple[float, float, float], turn: Rotation, count: int = 3000) -> np.ndarray:

@@ -16,7 +16,7 @@ from cagefield.errors import CagefieldError
 if TYPE_CHECKING:
     from cagefield.scene.scene import Scene
     from cagefield.selection import Elements
-    from cagefield.selection.deformed_positions import DeformedPositions
+    from cagefield.selection.element_positions import DeformedPositions
     from cagefield.typing import Mask
 
 Range = tuple[float, float]
@@ -69,7 +69,7 @@ class Select:
         from cagefield.edits import EditStack
         from cagefield.scene.scene import Scene
         from cagefield.scene.scene_files import check_destination
-        from cagefield.selection.deformed_positions import deformed_positions
+        from cagefield.selection.element_positions import deformed_positions
         from cagefield.selection.field_elements import elements_of_field
 
         if self.remove != (self.out is not None):
@@ -91,7 +91,7 @@ class Select:
 
     def _selected(self, elements: Elements, seen: DeformedPositions) -> Mask:
         from cagefield.selection.elements import ATTRIBUTES
-        from cagefield.selection.floaters import floaters
+        from cagefield.selection.floater_preset import floaters
         from cagefield.selection.neighborhoods import flood, grow, shrink
 
         if min(self.grow, self.shrink) < 0:

@@ -4,7 +4,7 @@ A field has *elements*: its splats, or the occupied cells of a grid over its den
 is a mask over them (`element_selection`), in canonical space: it stays when edits change.
 
 Rule for edited scenes. An element is seen where the edits take it, at each of its deformed positions
-(`deformed_positions`): a copy shows its elements twice, a delete nowhere. A region of the screen picks the
+(`element_positions`): a copy shows its elements twice, a delete nowhere. A region of the screen picks the
 elements that have at least one position in it; so a brush on the copy of a thing selects the thing, and the
 highlight shows both. Pasted content, and patches of uncovered regions, are no elements of the field.
 """

@@ -18,7 +18,7 @@ from scipy import ndimage
 
 from cagefield.cameras.camera import Camera
 from cagefield.errors import CagefieldError
-from cagefield.selection.deformed_positions import DeformedPositions
+from cagefield.selection.element_positions import DeformedPositions
 from cagefield.typing import Array, Float32, Mask
 
 Points = Sequence[tuple[float, float]]

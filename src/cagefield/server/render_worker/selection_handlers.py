@@ -11,11 +11,11 @@ from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
 from cagefield.selection.bounding_cages import oriented_box
-from cagefield.selection.deformed_positions import DeformedPositions, deformed_positions
+from cagefield.selection.element_positions import DeformedPositions, deformed_positions
 from cagefield.selection.element_selection import Selection
 from cagefield.selection.elements import Elements, histogram
 from cagefield.selection.field_elements import elements_of_field
-from cagefield.selection.floaters import floaters
+from cagefield.selection.floater_preset import floaters
 from cagefield.selection.neighborhoods import flood, grow, interior, shrink
 from cagefield.selection.screen_regions import elements_in_region
 from cagefield.server.render_worker.picks import (
