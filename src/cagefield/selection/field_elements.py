@@ -179,7 +179,7 @@ def _mean_rgb(sh: Float32) -> Float32:
 def _cells_at(points: Float32 | Array, low: Array, edge: float, shape: tuple[int, ...]) -> NDArray[np.int32]:
     """Cells [N,3] of points [N,3]; -1 outside of the grid."""
     cells = np.floor((points - low) / edge)
-    inside = ((cells >= 0) & (cells < shape)).all(axis=1)
+    inside: Mask = np.asarray(((cells >= 0) & (cells < shape)).all(axis=1))
     return np.where(inside[:, None], cells, -1).astype(np.int32)
 
 

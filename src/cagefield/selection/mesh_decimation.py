@@ -101,7 +101,7 @@ class _Mesh:
         lengths = np.linalg.norm(old, axis=1) * np.linalg.norm(new, axis=1)
         return bool((cosines <= MIN_NORMAL_COSINE * lengths).any())
 
-    def _push(self, edges: NDArray[np.integer]) -> None:  # type: ignore[type-arg]
+    def _push(self, edges: NDArray[np.integer]) -> None:
         """Add edges [E,2] with their positions of least error to the heap."""
         quadrics = self.quadrics[edges[:, 0]] + self.quadrics[edges[:, 1]]
         middle = self.points[edges].mean(axis=1)
