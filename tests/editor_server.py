@@ -131,6 +131,10 @@ class PageClient:
             self.messages.append(header)
             self.send("presented", picture=header["picture"])
             return header  # type: ignore[no-any-return]
+        if header["type"] == "highlight":
+            assert len(content) == 4 + length + 6 * header["count"]
+            self.messages.append(header)
+            return header  # type: ignore[no-any-return]
         end = 4 + length + header["picture_bytes"]
         assert len(content) == end + header["depth_bytes"]
         self.pictures.append(Picture(header, content[4 + length : end], content[end:]))

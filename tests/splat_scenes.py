@@ -43,6 +43,25 @@ def ball_of_splats(count: int = 600, radius: float = 0.5, seed: int = 0) -> Spla
     )
 
 
+BALL_RADIUS = 0.25
+
+
+def ball_and_floor() -> SplatField:
+    """A red ball of radius .25 around the origin, over a grey floor at z = -.5."""
+    ball = ball_of_splats(800, BALL_RADIUS)
+    axis = np.linspace(-0.9, 0.9, 24)
+    x, y = (values.reshape(-1) for values in np.meshgrid(axis, axis))
+    floor = len(x)
+    return SplatField(
+        np.concatenate([ball.means, np.stack([x, y, np.full(floor, -0.5)], axis=1)]),
+        np.concatenate([ball.log_scales, np.tile(np.log([0.05, 0.05, 0.005]), (floor, 1))]),
+        np.concatenate([ball.quaternions, np.tile([1.0, 0, 0, 0], (floor, 1))]),
+        np.concatenate([ball.opacities, np.full(floor, 0.9)]),
+        np.concatenate([ball.sh, np.full((floor, 1, 3), (0.4 - 0.5) / SH_C0)]),
+        bounds=np.array([[-1.0] * 3, [1.0] * 3]),
+    )
+
+
 def splat_scene() -> Scene:
     """The ball of splats with 3 training and 2 test cameras of 24 x 16 pixels, no edits, white background."""
     cameras = {

@@ -22,28 +22,10 @@ from editor_cone import cone, difference, moved
 from editor_jobs import read_video, render
 from editor_page import EditorPage, editor_page
 from editor_server import EditorServer, editor_server
-from scenes import SH_C0
-from splat_scenes import ball_of_splats
+from splat_scenes import BALL_RADIUS as RADIUS
+from splat_scenes import ball_and_floor
 
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-
-RADIUS = 0.25
-
-
-def ball_and_floor() -> SplatField:
-    """A red ball of radius .25 around the origin, over a grey floor at z = -.5."""
-    ball = ball_of_splats(800, RADIUS)
-    axis = np.linspace(-0.9, 0.9, 24)
-    x, y = (values.reshape(-1) for values in np.meshgrid(axis, axis))
-    floor = len(x)
-    return SplatField(
-        np.concatenate([ball.means, np.stack([x, y, np.full(floor, -0.5)], axis=1)]),
-        np.concatenate([ball.log_scales, np.tile(np.log([0.05, 0.05, 0.005]), (floor, 1))]),
-        np.concatenate([ball.quaternions, np.tile([1.0, 0, 0, 0], (floor, 1))]),
-        np.concatenate([ball.opacities, np.full(floor, 0.9)]),
-        np.concatenate([ball.sh, np.full((floor, 1, 3), (0.4 - 0.5) / SH_C0)]),
-        bounds=np.array([[-1.0] * 3, [1.0] * 3]),
-    )
 
 
 @pytest.fixture(scope="module")

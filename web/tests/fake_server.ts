@@ -46,6 +46,8 @@ export function state(change: Partial<State> = {}): State {
     preserve_opacity: false,
     keys: [],
     loop: false,
+    selection: null,
+    isolated: false,
     ...change,
   };
 }

@@ -193,8 +193,9 @@ describe("what is drawn", () => {
 
 describe("keys", () => {
   const nobody: unknown = {};
+  const noRegions = { cancel: () => false };
   it("each mean one thing, and all that the editor needs is there", () => {
-    const all = bindings(nobody as App, nobody as Actions, nobody as Pointer, {
+    const all = bindings(nobody as App, nobody as Actions, nobody as Pointer, noRegions, {
       saveAs: vi.fn(),
       paste: vi.fn(),
     }).flatMap((binding) => binding.keys);
@@ -226,10 +227,16 @@ describe("keys", () => {
   it("switch what is filled, and whether shadows go along, where there is such a thing", () => {
     const store = new Store();
     const app = { store, send: vi.fn(), say: vi.fn() };
-    const all = bindings(app as unknown as App, new Actions(app as unknown as App), nobody as Pointer, {
-      saveAs: vi.fn(),
-      paste: vi.fn(),
-    });
+    const all = bindings(
+      app as unknown as App,
+      new Actions(app as unknown as App),
+      nobody as Pointer,
+      noRegions,
+      {
+        saveAs: vi.fn(),
+        paste: vi.fn(),
+      },
+    );
     const press = (key: string): void => all.find(({ keys }) => keys.includes(key))!.run();
     store.set({ state: state({ edits: [edit({ kind: "move" })] }) });
     press("U");
@@ -253,6 +260,7 @@ describe("keys", () => {
       app as unknown as App,
       new Actions(app as unknown as App),
       nobody as Pointer,
+      noRegions,
       questions,
     );
     const press = (key: string): void => all.find(({ keys }) => keys.includes(key))!.run();
@@ -271,6 +279,9 @@ describe("keys", () => {
     expect(key("?", false, true)).toBe("?");
     expect(key("Tab")).toBe("Tab");
     expect(key("g")).toBe("G");
+    expect(key("+", true)).toBe("Ctrl++");
+    const alt = { key: "å", code: "KeyA", altKey: true, ctrlKey: false, metaKey: false, shiftKey: false };
+    expect(keyName(alt)).toBe("Alt+A");
   });
 });
 

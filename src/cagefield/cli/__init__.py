@@ -75,6 +75,7 @@ def parse(args: list[str]) -> Command | int:
     from cagefield.cli.make_scene import MakeScene
     from cagefield.cli.poses import Poses
     from cagefield.cli.render import Render
+    from cagefield.cli.select import Select
     from cagefield.cli.train import Train
     from cagefield.cli.view import View
 
@@ -92,6 +93,7 @@ def parse(args: list[str]) -> Command | int:
         | Annotated[Bake, tyro.conf.subcommand("bake")]
         | Annotated[View, tyro.conf.subcommand("view")]
         | Annotated[ApplyEdits, tyro.conf.subcommand("edit")]
+        | Annotated[Select, tyro.conf.subcommand("select")]
         | Annotated[Export, tyro.conf.subcommand("export")]
         | Annotated[Render, tyro.conf.subcommand("render")]
         | Annotated[Info, tyro.conf.subcommand("info")]

@@ -5,6 +5,7 @@ import { cageOverlay, shownCages } from "../editing/cage_overlay";
 import { Drag, targetCage } from "../editing/drag";
 import { Gizmo } from "../editing/gizmo";
 import { Grid } from "../editing/grid";
+import { Highlight } from "../editing/highlight";
 import { Handles } from "../editing/handles";
 import { Lines } from "../editing/lines";
 import type { Operation } from "../editing/operations";
@@ -50,6 +51,7 @@ const CANVAS_KEYS = [
   "cage",
   "corners",
   "hover",
+  "selecting",
   "cages",
   "grid",
   "view",
@@ -74,6 +76,7 @@ export class App {
   drag: Drag | null = null;
   private readonly lines: Lines;
   private readonly handles: Handles;
+  readonly highlight: Highlight;
   private readonly connection: Connection;
   private readonly grid: Grid;
   /** Callbacks of the questions without an answer yet, by the number of the request. */
@@ -88,6 +91,7 @@ export class App {
     this.pictures = new Pictures(this.viewport);
     this.lines = new Lines(this.viewport, this.pictures);
     this.handles = new Handles(this.viewport);
+    this.highlight = new Highlight(this.viewport, this.pictures);
     this.gizmo = new Gizmo(this.viewport.scene, this.viewport.camera);
     const { store, viewport, pictures } = this;
     const send = (message: PageMessage): boolean => this.send(message);
@@ -220,8 +224,11 @@ export class App {
     const { segments, dots } = cageOverlay(now, this.drag, grid, eye);
     this.lines.set(segments);
     this.handles.set(dots);
+    const { selection } = now.state ?? { selection: null };
+    this.highlight.draw(selection !== null && this.drag === null && now.preview === null && !now.before);
     const hasGizmo = now.tool !== "select" || now.corners.length > 0;
-    if (edit === null || !showsCages(now) || dragObstacle(now, edit) !== null || !hasGizmo) {
+    const isMovable = edit !== null && dragObstacle(now, edit) === null && now.selecting === null;
+    if (!isMovable || !showsCages(now) || !hasGizmo) {
       this.gizmo.hide();
       return;
     }
@@ -316,7 +323,8 @@ export class App {
 
   private takeBinary(message: ArrayBuffer): void {
     const { header, start } = readHeader(message);
-    if (header.type === "edits") this.page.takeEdits(header, message.slice(start));
+    if (header.type === "highlight") this.highlight.take(header, message.slice(start));
+    else if (header.type === "edits") this.page.takeEdits(header, message.slice(start));
     else this.frames.take(message, header, start);
   }
 

@@ -4,6 +4,7 @@ import { App } from "./app";
 import { testApi } from "./test_api";
 import { bindings, listenForKeys } from "../editing/keys";
 import { Pointer } from "../editing/pointer";
+import { RegionTools } from "../editing/region_tools";
 import { storeSession } from "./session_storage";
 import { READ_ONLY_NOTICE, isReadOnly } from "./store";
 import { dialogs } from "../ui/dialogs";
@@ -15,6 +16,7 @@ import { jobs } from "../ui/jobs";
 import { options } from "../ui/options";
 import { overlay } from "../ui/overlay";
 import { pathList } from "../ui/path_list";
+import { selectionPanel } from "../ui/selection_panel";
 import { status } from "../ui/status";
 import { toolbar } from "../ui/toolbar";
 import { topbar } from "../ui/topbar";
@@ -26,8 +28,9 @@ document.body.append(root);
 const app = new App(view);
 const questions = dialogs(app);
 const actions = new Actions(app, () => questions.saveAs());
+const regions = new RegionTools(app);
 const pointer = new Pointer(app);
-const keys = bindings(app, actions, pointer, questions);
+const keys = bindings(app, actions, pointer, regions, questions);
 listenForKeys(app, actions, pointer, keys);
 
 // Buttons and fields of a read-only page are disabled.
@@ -36,12 +39,13 @@ const controls = h(
   { class: "controls" },
   editsList(app, actions, questions),
   options(app, actions),
+  selectionPanel(app, actions),
   historyList(app),
   pathList(app, actions, questions),
   jobs(app),
 );
 const panel = h("aside", { class: "panel" }, controls);
-view.append(overlay(app, pointer));
+view.append(regions.element, overlay(app, pointer));
 root.append(
   topbar(app, actions, questions),
   toolbar(app, actions),

@@ -11,6 +11,7 @@ import type {
   PageMessage,
   Preparing,
   Preview,
+  SelectRegion,
   State,
 } from "../net/protocol";
 
@@ -18,6 +19,10 @@ export type Tool = "select" | "translate" | "rotate" | "scale";
 export type View = NonNullable<DisplayMessage["view"]>;
 /** Frames that the page draws itself. */
 export type DrawnHere = Drawing["here"];
+/** Tool that selects elements of the field with the left button. */
+export type SelectTool = "brush" | "lasso" | "rectangle" | "flood";
+/** How picked elements join those selected before. */
+export type SelectMode = NonNullable<SelectRegion["mode"]>;
 export type CageName = "inner" | "outer" | "both";
 export type Target = "field" | CageName;
 
@@ -60,6 +65,18 @@ export interface Editor {
   /** Corners that are dragged together, by the gizmo or by one of the corners. */
   corners: number[];
   hover: Hover | null;
+  /** The tool that selects elements; null for the tools of cages. */
+  selecting: SelectTool | null;
+  selectMode: SelectMode;
+  /** Radius of the brush, a share of the height of the view. */
+  brushRadius: number;
+  /** Whether regions select through the field, not the visible surface alone. */
+  through: boolean;
+  /** Depth behind the visible surface up to which regions select, in cells. */
+  depthTolerance: number;
+  floodOpacity: number;
+  /** Reach of a flood, a share of the diagonal of the field's box; 1 without a bound. */
+  floodReach: number;
   /** Reason for the limit of the drag in progress; null without a limit. */
   limit: string | null;
   notice: Notice | null;
@@ -93,6 +110,13 @@ export const INITIAL: Editor = {
   help: false,
   corners: [],
   hover: null,
+  selecting: null,
+  selectMode: "replace",
+  brushRadius: 0.04,
+  through: false,
+  depthTolerance: 1.5,
+  floodOpacity: 0.3,
+  floodReach: 1,
   limit: null,
   notice: null,
   preparing: null,

@@ -25,6 +25,8 @@ export interface TestApi {
     rates: string;
   };
   readonly camera: { c2w: number[]; seq: number };
+  /** Number of positions of selected elements that are drawn. */
+  readonly highlighted: number;
   /** The drag in progress: the operation that the cages follow, and the reason if that is not all of it. */
   readonly drag: {
     id: number;
@@ -89,6 +91,9 @@ export function testApi(app: App): TestApi {
     },
     get camera() {
       return { c2w: viewport.c2w, seq: app.camera.seq };
+    },
+    get highlighted() {
+      return app.highlight.shown;
     },
     get drag() {
       if (app.drag === null) return null;

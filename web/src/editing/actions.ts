@@ -2,7 +2,7 @@
 import { halfExtent, centroid } from "./cage";
 import { targetCage } from "./drag";
 import type { App } from "../app/app";
-import type { Command, EditState, Mirror, Place, Vec3 } from "../net/protocol";
+import type { ChangeSelection, Command, EditState, Mirror, Place, Vec3 } from "../net/protocol";
 import { isSplatFile, uploadAddress, uploadFile } from "../net/upload";
 import {
   canFill,
@@ -11,12 +11,18 @@ import {
   dragTarget,
   type CageName,
   type Editor,
+  type SelectTool,
   type Tool,
   type View,
 } from "../app/store";
 
 const VIEWS: View[] = ["colour", "depth", "opacity", "normals"];
 const CAGES: CageName[] = ["inner", "outer", "both"];
+
+/** Limits of the brush's radius, shares of the view's height, and the factor of a step. */
+const MIN_BRUSH = 0.005;
+const MAX_BRUSH = 0.5;
+const BRUSH_STEP = 1.2;
 
 export class Actions {
   private cameraIndex = -1;
@@ -28,7 +34,39 @@ export class Actions {
   ) {}
 
   setTool(tool: Tool): void {
-    this.app.store.set({ tool });
+    this.app.store.set({ tool, selecting: null });
+  }
+
+  /** Takes a tool that selects elements, or puts it away. */
+  toggleSelecting(tool: SelectTool): void {
+    const { selecting } = this.app.store.now;
+    this.app.store.set({ selecting: selecting === tool ? null : tool, hover: null });
+  }
+
+  /** Changes the size of the brush by a step; false where the brush is not the tool. */
+  resizeBrush(step: 1 | -1): boolean {
+    const { selecting, brushRadius } = this.app.store.now;
+    if (selecting !== "brush") return false;
+    const radius = brushRadius * (step > 0 ? BRUSH_STEP : 1 / BRUSH_STEP);
+    this.app.store.set({ brushRadius: Math.min(MAX_BRUSH, Math.max(MIN_BRUSH, radius)) });
+    return true;
+  }
+
+  changeSelection(change: ChangeSelection["change"]): void {
+    this.app.send({ type: "change_selection", change });
+  }
+
+  /** Shows the selected elements alone, or all again. */
+  toggleIsolated(): void {
+    this.app.send({ type: "isolate", on: this.app.store.now.state?.isolated !== true });
+  }
+
+  /** Makes an edit whose inner cage holds the selected elements; `margin` in cells. */
+  encloseSelection(margin?: number): void {
+    if (this.app.store.now.state?.selection == null)
+      return this.app.say("nothing is selected: paint with the brush (M), or drag a lasso (J)", "warning");
+    this.app.expectEdit();
+    this.app.send({ type: "selection_cage", ...(margin === undefined ? {} : { margin }) });
   }
 
   setMode(mode: Editor["mode"]): void {
@@ -227,11 +265,15 @@ export class Actions {
     this.app.send({ type: "set_path", keys: [...state.keys, key], loop: state.loop });
   }
 
-  /** Cancels the first of these that exists: the drag, the help, the chosen corners, the selection. */
+  /**
+   * Cancels the first of these that exists: the drag, the help, the tool that selects elements, the chosen
+   * corners, the selected edit.
+   */
   escape(cancelDrag: () => boolean): void {
     const { now } = this.app.store;
     if (cancelDrag()) return;
     if (now.help) this.app.store.set({ help: false });
+    else if (now.selecting !== null) this.app.store.set({ selecting: null });
     else if (now.corners.length > 0) this.app.store.set({ corners: [] });
     else if (now.state?.selected != null) this.command("select", null);
   }

@@ -2,6 +2,7 @@
 import type { Actions } from "./actions";
 import type { App } from "../app/app";
 import type { Pointer } from "./pointer";
+import type { RegionTools } from "./region_tools";
 import { READ_ONLY_NOTICE, isReadOnly } from "../app/store";
 import type { Dialogs } from "../ui/dialogs";
 
@@ -12,7 +13,7 @@ export interface Binding {
   /** Keys with the same action, as the help shows them: "Ctrl+Shift+Z". */
   keys: string[];
   action: string;
-  group: "Tools" | "Cages" | "Edits" | "View" | "Scene";
+  group: "Tools" | "Cages" | "Selection" | "Edits" | "View" | "Scene";
   run: () => void;
 }
 
@@ -21,6 +22,7 @@ export function bindings(
   app: App,
   actions: Actions,
   pointer: Pointer,
+  regions: Pick<RegionTools, "cancel">,
   dialogs: Pick<Dialogs, "saveAs" | "paste">,
 ): Binding[] {
   return [
@@ -34,7 +36,7 @@ export function bindings(
       group: "Tools",
       keys: ["Escape"],
       action: "Cancel the drag; clear the selection",
-      run: () => actions.escape(() => pointer.cancel()),
+      run: () => actions.escape(() => regions.cancel() || pointer.cancel()),
     },
     {
       group: "Cages",
@@ -47,6 +49,55 @@ export function bindings(
       keys: ["I"],
       action: "Fit the inner cage to the dense part of its content",
       run: () => actions.fitInner(),
+    },
+    {
+      group: "Selection",
+      keys: ["M"],
+      action: "Brush: paint over elements; [ and ] change its size",
+      run: () => actions.toggleSelecting("brush"),
+    },
+    { group: "Selection", keys: ["J"], action: "Lasso", run: () => actions.toggleSelecting("lasso") },
+    {
+      group: "Selection",
+      keys: ["A"],
+      action: "Select all",
+      run: () => actions.changeSelection("all"),
+    },
+    {
+      group: "Selection",
+      keys: ["Alt+A"],
+      action: "Select none",
+      run: () => actions.changeSelection("none"),
+    },
+    {
+      group: "Selection",
+      keys: ["Ctrl+I"],
+      action: "Invert the selection",
+      run: () => actions.changeSelection("invert"),
+    },
+    {
+      group: "Selection",
+      keys: ["Ctrl++", "Ctrl+="],
+      action: "Grow the selection",
+      run: () => actions.changeSelection("grow"),
+    },
+    {
+      group: "Selection",
+      keys: ["Ctrl+-"],
+      action: "Shrink the selection",
+      run: () => actions.changeSelection("shrink"),
+    },
+    {
+      group: "Selection",
+      keys: ["E"],
+      action: "Enclose the selection in a new cage",
+      run: () => actions.encloseSelection(),
+    },
+    {
+      group: "Selection",
+      keys: ["/"],
+      action: "Isolate the selection, or show everything again",
+      run: () => actions.toggleIsolated(),
     },
     { group: "Edits", keys: ["D"], action: "Discrete or continuous", run: () => actions.toggleKind() },
     {
@@ -85,8 +136,18 @@ export function bindings(
     },
     { group: "View", keys: ["N"], action: "Show or hide the panel", run: () => actions.toggle("panel") },
     { group: "View", keys: ["Home"], action: "Look from the start", run: () => actions.lookFrom(null) },
-    { group: "View", keys: ["["], action: "Previous camera of the scene", run: () => actions.lookFrom(-1) },
-    { group: "View", keys: ["]"], action: "Next camera of the scene", run: () => actions.lookFrom(1) },
+    {
+      group: "View",
+      keys: ["["],
+      action: "Previous camera of the scene; smaller brush",
+      run: () => actions.resizeBrush(-1) || actions.lookFrom(-1),
+    },
+    {
+      group: "View",
+      keys: ["]"],
+      action: "Next camera of the scene; larger brush",
+      run: () => actions.resizeBrush(1) || actions.lookFrom(1),
+    },
     { group: "Scene", keys: ["Ctrl+S"], action: "Save", run: () => actions.save() },
     { group: "Scene", keys: ["Ctrl+Shift+S"], action: "Save as", run: () => dialogs.saveAs() },
     { group: "Scene", keys: ["K"], action: "Keyframe of the camera path", run: () => actions.addKey() },
@@ -105,12 +166,23 @@ export const MOUSE_BINDINGS: { keys: string[]; action: string }[] = [
   { keys: ["Ctrl"], action: "While dragging: snap (15°, tenths, round lengths)" },
   { keys: ["X", "Y", "Z"], action: "While dragging a corner, edge or face: along this axis" },
   { keys: ["Shift+click"], action: "Choose corners, edges and faces to drag together" },
+  { keys: ["Shift+drag"], action: "Beside the cages: select in a rectangle" },
+  {
+    keys: ["Shift", "Ctrl"],
+    action: "While selecting: add, subtract; both: intersect. Alt+drag orbits",
+  },
   { keys: ["Double-click"], action: "A new pair of cages around the surface there" },
   { keys: ["Left", "Right", "Wheel"], action: "Orbit, pan, zoom" },
 ];
 
 /** Name of an event's key in the notation of the bindings. */
-export function keyName(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" | "shiftKey">): string {
+export function keyName(
+  event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" | "shiftKey"> &
+    Partial<Pick<KeyboardEvent, "altKey" | "code">>,
+): string {
+  // With Alt some systems type other letters: the key's place on the keyboard counts.
+  const letter = event.altKey === true ? /^Key([A-Z])$/.exec(event.code ?? "") : null;
+  if (letter !== null && !event.ctrlKey) return `Alt+${letter[1]}`;
   const key = event.key.length === 1 ? event.key.toUpperCase() : event.key;
   const control = event.ctrlKey || event.metaKey ? "Ctrl+" : "";
   const shift = event.shiftKey && /^[A-Z]$/.test(key) ? "Shift+" : "";

@@ -117,7 +117,7 @@ export class Pointer {
   private move(event: PointerEvent): void {
     this.readPosition(event);
     if (this.hold !== null) this.applyNewMotion();
-    else if (event.buttons === 0) this.updateHover();
+    else if (event.buttons === 0 && this.app.store.now.selecting === null) this.updateHover();
   }
 
   private up(event: PointerEvent): void {

@@ -1,5 +1,5 @@
 /** Format of binary messages: a header in JSON, an image and its depth map. */
-import type { EditsHeader, PictureHeader } from "../net/protocol";
+import type { EditsHeader, HighlightHeader, PictureHeader } from "../net/protocol";
 
 export interface PictureParts {
   header: PictureHeader;
@@ -9,10 +9,13 @@ export interface PictureParts {
 }
 
 /** The header of a binary message, and the offset of the byte after it. */
-export function readHeader(message: ArrayBuffer): { header: PictureHeader | EditsHeader; start: number } {
+export function readHeader(message: ArrayBuffer): {
+  header: PictureHeader | EditsHeader | HighlightHeader;
+  start: number;
+} {
   const length = new DataView(message).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, length))) as
-    PictureHeader | EditsHeader;
+    PictureHeader | EditsHeader | HighlightHeader;
   return { header, start: 4 + length };
 }
 

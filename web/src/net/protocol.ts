@@ -40,7 +40,14 @@ export type PageMessage =
   | SetPath
   | RenderJob
   | ExportSplats
-  | CancelJob;
+  | CancelJob
+  | SelectRegion
+  | SelectRange
+  | SelectFlood
+  | SelectFloaters
+  | ChangeSelection
+  | SelectionCage
+  | Isolate;
 export type ServerMessage = Hello | State | Dragged | Answer | Notice | Preview | Preparing | Job;
 
 /**
@@ -100,15 +107,16 @@ export interface MoveCornersBy {
  * A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying), its "grid"; "path".
  *
  * The "path" is the camera path between its keyframes, as its video goes; "sources" are the scenes and files
- * that can be pasted.
+ * that can be pasted; a "histogram" is of an `attribute` of the field's elements.
  */
 export interface Ask {
   type: "ask";
   request: number;
-  what: "surface" | "edit_text" | "grid" | "path" | "sources";
+  what: "surface" | "edit_text" | "grid" | "path" | "sources" | "histogram";
   x?: number;
   y?: number;
   edit?: number | null;
+  attribute?: "size" | "opacity" | "red" | "green" | "blue" | "hue" | "saturation" | "value";
 }
 /**
  * Camera of the page; `moving` while the mouse turns the view.
@@ -148,6 +156,13 @@ export interface Change {
    * 0: exact
    */
   lattice?: number | null;
+}
+/**
+ * Selects all or none, inverts the selection, or grows or shrinks it by a cell.
+ */
+export interface ChangeSelection {
+  type: "change_selection";
+  change: "all" | "none" | "invert" | "grow" | "shrink";
 }
 /**
  * Command with an edit's number as its only argument.
@@ -235,6 +250,13 @@ export interface FitInner {
 export interface GoTo {
   type: "go_to";
   entry: number;
+}
+/**
+ * Shows the selected elements alone, on all pages, or all again.
+ */
+export interface Isolate {
+  type: "isolate";
+  on: boolean;
 }
 /**
  * A keyframe of a camera path: a camera, and how far each edit has gone (1 where it is not named).
@@ -355,6 +377,56 @@ export interface SceneChange {
   preserve_opacity: boolean;
 }
 /**
+ * Picks probable floaters, few at strength 0 and many at 1.
+ */
+export interface SelectFloaters {
+  type: "select_floaters";
+  strength?: number;
+  mode?: "replace" | "add" | "subtract" | "intersect";
+}
+/**
+ * Picks the elements connected to the surface at a pixel by cells of some opacity.
+ */
+export interface SelectFlood {
+  type: "select_flood";
+  x: number;
+  y: number;
+  threshold?: number;
+  reach?: number;
+  mode?: "replace" | "add" | "subtract" | "intersect";
+}
+/**
+ * Picks elements by the range of an attribute.
+ */
+export interface SelectRange {
+  type: "select_range";
+  attribute: "size" | "opacity" | "red" | "green" | "blue" | "hue" | "saturation" | "value";
+  low: number;
+  high: number;
+  mode?: "replace" | "add" | "subtract" | "intersect";
+}
+/**
+ * Picks elements in a region of the picture.
+ *
+ * The points are two opposite corners of a rectangle, the vertices of a lasso, or those of a brush stroke.
+ */
+export interface SelectRegion {
+  type: "select_region";
+  shape: "rectangle" | "lasso" | "brush";
+  points: [number, number][];
+  radius?: number;
+  mode?: "replace" | "add" | "subtract" | "intersect";
+  through?: boolean;
+  tolerance?: number;
+}
+/**
+ * A new edit with an inner cage around the selected elements as they are seen, an oriented box.
+ */
+export interface SelectionCage {
+  type: "selection_cage";
+  margin?: number;
+}
+/**
  * A cage's corners by number, in Set mode: nothing of the field moves.
  */
 export interface SetCage {
@@ -372,7 +444,8 @@ export interface SetPath {
   loop?: boolean;
 }
 /**
- * The answer to an `ask`: a point and its normal, a text, a grid, the path, or sources; or nothing.
+ * The answer to an `ask`: a point and its normal, a text, a grid, the path, sources, or a histogram; or
+ * nothing.
  */
 export interface Answer {
   type: "answer";
@@ -383,6 +456,7 @@ export interface Answer {
   grid: Vec3[][];
   stills: Still[];
   sources: string[];
+  histogram: HistogramCounts | null;
   failed: boolean;
 }
 /**
@@ -391,6 +465,15 @@ export interface Answer {
 export interface Still {
   c2w: number[];
   fov_y_deg: number;
+}
+/**
+ * Counts of an attribute's values in even bins between two ends; of sizes, even in their logarithm.
+ */
+export interface HistogramCounts {
+  low: number;
+  high: number;
+  counts: number[];
+  selected: number[];
 }
 /**
  * Result of a `drag`: `part` of the operation was followed; `why` where `part` is below 1.
@@ -494,6 +577,13 @@ export interface Preview {
   on: boolean;
 }
 /**
+ * Number of selected elements of the field, splats or cells of a grid, and of all.
+ */
+export interface SelectionCount {
+  count: number;
+  total: number;
+}
+/**
  * Everything that pages show of the edits; sent to all pages after each change.
  */
 export interface State {
@@ -510,6 +600,8 @@ export interface State {
   preserve_opacity: boolean;
   keys: Key[];
   loop: boolean;
+  selection: SelectionCount | null;
+  isolated: boolean;
 }
 /**
  * Heads a binary message: uint32 (little endian) length of this JSON, the JSON, the picture, the depth.
@@ -564,4 +656,16 @@ export interface EditsHeader {
   why: string | null;
   map_ms: number;
   encode_ms: number;
+}
+/**
+ * Heads a binary message with positions at which selected elements are seen, after each change of them.
+ *
+ * `count` positions follow the header, each as uint16 (little endian) x, y, z: 0 at `low`, 65535 at `high`.
+ */
+export interface HighlightHeader {
+  type: "highlight";
+  count: number;
+  low: Vec3;
+  high: Vec3;
+  size: number;
 }

@@ -3,7 +3,7 @@ import { MOUSE_BINDINGS, type Binding } from "../editing/keys";
 import type { App } from "../app/app";
 import { h } from "./dom";
 
-const GROUPS: Binding["group"][] = ["Tools", "Cages", "Edits", "View", "Scene"];
+const GROUPS: Binding["group"][] = ["Tools", "Cages", "Selection", "Edits", "View", "Scene"];
 
 export function help(app: App, bindings: Binding[]): HTMLElement {
   const line = ({ keys, action }: Pick<Binding, "keys" | "action">): HTMLElement =>

@@ -4,20 +4,32 @@ import {
   Box,
   Boxes,
   Globe,
+  LassoSelect,
   Magnet,
   MousePointer2,
   Move3d,
+  Paintbrush,
+  PaintBucket,
   PencilRuler,
   Rotate3d,
   Scale3d,
   Spline,
   Square,
   SquareDashed,
+  SquareDashedMousePointer,
+  type IconNode,
 } from "lucide";
 import type { Actions } from "../editing/actions";
 import type { App } from "../app/app";
-import { isReadOnly, type Editor } from "../app/store";
+import { isReadOnly, type Editor, type SelectTool } from "../app/store";
 import { h, iconButton } from "./dom";
+
+const SELECT_TOOLS: [IconNode, SelectTool, string][] = [
+  [Paintbrush, "brush", "Select with a brush (M); [ and ] change its size"],
+  [LassoSelect, "lasso", "Select with a lasso (J)"],
+  [SquareDashedMousePointer, "rectangle", "Select in a rectangle (Shift+drag)"],
+  [PaintBucket, "flood", "Select what is connected to a click"],
+];
 
 export function toolbar(app: App, actions: Actions): HTMLElement {
   const bar = h("nav", { class: "tools" });
@@ -58,19 +70,19 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
     tools(
       add(
         iconButton(MousePointer2, "Select: no gizmo (4, Q)", () => actions.setTool("select"), "tool-select"),
-        (e) => e.tool === "select",
+        (e) => e.selecting === null && e.tool === "select",
       ),
       add(
         iconButton(Move3d, "Move (1, G)", () => actions.setTool("translate"), "tool-translate"),
-        (e) => e.tool === "translate",
+        (e) => e.selecting === null && e.tool === "translate",
       ),
       add(
         iconButton(Rotate3d, "Rotate (2, R)", () => actions.setTool("rotate"), "tool-rotate"),
-        (e) => e.tool === "rotate",
+        (e) => e.selecting === null && e.tool === "rotate",
       ),
       add(
         iconButton(Scale3d, "Scale (3, S)", () => actions.setTool("scale"), "tool-scale"),
-        (e) => e.tool === "scale",
+        (e) => e.selecting === null && e.tool === "scale",
       ),
     ),
     tools(
@@ -93,6 +105,14 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
         (e) => e.mode === "edit",
       ),
     ),
+    tools(
+      ...SELECT_TOOLS.map(([node, tool, title]) =>
+        add(
+          iconButton(node, title, () => actions.toggleSelecting(tool), `select-${tool}`),
+          (e) => e.selecting === tool,
+        ),
+      ),
+    ),
     cages,
     tools(
       add(
@@ -112,7 +132,7 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
       ),
     ),
   );
-  app.store.watch(["hello", "tool", "mode", "cage", "axes", "snap", "cages"], (now) => {
+  app.store.watch(["hello", "tool", "selecting", "mode", "cage", "axes", "snap", "cages"], (now) => {
     for (const element of editing) element.hidden = isReadOnly(now);
     for (const [button, on] of lit) button.classList.toggle("on", on(now));
     for (const element of setOnly) element.classList.toggle("away", now.mode !== "set" || isReadOnly(now));

@@ -10,6 +10,7 @@ from cagefield.edits import Edit, EditStack
 from cagefield.edits.operations import Operation
 from cagefield.edits.shells import SMOOTH_FLOW, Flow
 from cagefield.errors import EditError
+from cagefield.selection.element_selection import Selection
 
 COLOURS = ("#4cc2ff", "#ffb14c", "#7ee081", "#ff7eb6", "#c9a7ff", "#f4e04d", "#5ce0d0", "#ff8a66")
 """Colours of cage pairs."""
@@ -36,12 +37,16 @@ class Entry:
 
 @dataclass(frozen=True)
 class Document:
-    """The edits in order, the scene's opacity choice, and the camera path's keyframes."""
+    """The edits in order, the scene's opacity choice, the camera path's keyframes, and the selected elements.
+
+    The selection is undone as edits are, all pages share it, and no file has it; None selects nothing.
+    """
 
     entries: tuple[Entry, ...] = ()
     preserve_opacity: bool = True
     keys: tuple[Keyframe, ...] = ()
     loop: bool = False
+    selection: Selection | None = None
 
     @classmethod
     def from_edits(
@@ -62,6 +67,11 @@ class Document:
     def stack(self) -> EditStack:
         """The edits as a stack."""
         return EditStack(entry.edit for entry in self.entries)
+
+    @property
+    def saved_part(self) -> Document:
+        """The document without its selection, which is not saved."""
+        return self if self.selection is None else replace(self, selection=None)
 
     @property
     def placed_keys(self) -> tuple[Keyframe, ...]:

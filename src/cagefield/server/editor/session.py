@@ -17,6 +17,8 @@ from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
+from cagefield.selection.bounding_cages import outer_cage_of_box
+from cagefield.selection.element_selection import Mode, Selection
 from cagefield.server.editor.active_drags import Drags
 from cagefield.server.editor.cage_placement import cage_pair_around, outer_cage_around
 from cagefield.server.editor.document import Document, Entry
@@ -35,6 +37,8 @@ from cagefield.typing import Array
 
 LATTICE = 64
 """Lattice nodes along an axis of a new continuous edit."""
+
+NOTHING_SELECTED = "nothing is selected; paint with the brush (M), or drag a lasso (J) around it"
 
 
 class Session:
@@ -59,6 +63,8 @@ class Session:
         self.drags = Drags()
         self.preview: Preview | None = None
         """Preview that a page plays; ends with the next change of the document or drag."""
+        self.isolated: Selection | None = None
+        """The only elements that pictures show, None for all; no entry of the history."""
         self.revision = 1
         self._saved: Document | None = document
         self._next = max((entry.id for entry in document.entries), default=0) + 1
@@ -84,7 +90,7 @@ class Session:
     @property
     def saved(self) -> bool:
         """True where the document is as it was last saved."""
-        return self.document == self._saved
+        return self.document.saved_part == self._saved
 
     def problem(self, edit: Edit) -> str | None:
         """Why an edit cannot be shown, or None; remembered for the edits that were asked about last."""
@@ -223,6 +229,33 @@ class Session:
         outer = outer_cage_around(entry.edit, margin)
         self._put(f"Outer margin{suffix_for(entry)}", replace(entry, edit=with_outer(entry.edit, outer)))
 
+    # ---- selected elements ----
+
+    def pick(self, label: str, picked: Selection, mode: Mode = "replace") -> None:
+        """The selection after elements were picked; an entry of the history where it changes."""
+        before = self.document.selection or Selection.none(picked.total)
+        after = before.combine(picked, mode)
+        self.select_elements(label, after)
+
+    def select_elements(self, label: str, selection: Selection | None) -> None:
+        """Another selection of elements; an entry of the history where it changes."""
+        selection = selection or None
+        if selection != self.document.selection:
+            self._push(label, replace(self.document, selection=selection))
+
+    def isolate(self, on: bool) -> None:
+        """Show the selected elements alone, on all pages, or all again. Raises EditError without any."""
+        if on and self.document.selection is None:
+            raise EditError(NOTHING_SELECTED)
+        self.isolated = self.document.selection if on else None
+        self.revision += 1
+
+    def place_around_selection(self, inner: Cage) -> int:
+        """The number of a new continuous edit, selected, its inner cage around the selected elements."""
+        outer = outer_cage_of_box(inner)
+        edit = Edit.continuous(inner, outer, name=fresh_name(self.document, "edit"), lattice=LATTICE)
+        return self._add("Cage around the selection", edit)
+
     # ---- options and the list ----
 
     def change(
@@ -355,7 +388,7 @@ class Session:
 
     def mark_saved(self) -> None:
         """Mark the present document as saved."""
-        self._saved = self.document
+        self._saved = self.document.saved_part
         self.revision += 1
 
     # ---- inside ----

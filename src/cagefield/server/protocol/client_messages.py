@@ -28,6 +28,7 @@ from cagefield.server.protocol.common import (
     View,
 )
 from cagefield.server.protocol.operation_messages import OperationMessage
+from cagefield.server.protocol.selection_messages import AttributeName, SelectionMessage
 
 
 class DisplayMessage(Message):
@@ -252,15 +253,16 @@ class Ask(Message):
     """A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying), its "grid"; "path".
 
     The "path" is the camera path between its keyframes, as its video goes; "sources" are the scenes and files
-    that can be pasted.
+    that can be pasted; a "histogram" is of an `attribute` of the field's elements.
     """
 
     type: Literal["ask"] = "ask"
     request: int
-    what: Literal["surface", "edit_text", "grid", "path", "sources"]
+    what: Literal["surface", "edit_text", "grid", "path", "sources", "histogram"]
     x: Annotated[float, Field(ge=0, le=1)] = 0.5
     y: Annotated[float, Field(ge=0, le=1)] = 0.5
     edit: EditId | None = None
+    attribute: AttributeName = "opacity"
 
 
 class SetPath(Message):
@@ -301,7 +303,7 @@ PageMessage: TypeAlias = Annotated[
     CameraMessage | DisplayMessage | PresentedMessage | Drawing | DragBegin | DragMove | DragEnd | DragCancel
     | PlayBegin | Play | PlayEnd | Apply | SetCage | Place | PasteScene | FitInner | OuterMargin | Change
     | SceneChange | Command | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath | RenderJob
-    | ExportSplats | CancelJob,
+    | ExportSplats | CancelJob | SelectionMessage,
     Field(discriminator="type"),
 ]  # fmt: skip
 

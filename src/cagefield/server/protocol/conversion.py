@@ -15,6 +15,7 @@ from cagefield.edits.operations import Operation
 from cagefield.edits.options import CastShadow
 from cagefield.errors import CameraError
 from cagefield.geometry.cage import Cage
+from cagefield.selection.element_selection import Selection
 from cagefield.server.editor.document import Entry
 from cagefield.server.editor.drag_solver import Moved, move_corners
 from cagefield.server.editor.edit_kinds import kind_of
@@ -147,7 +148,15 @@ def state_of(
             for key in document.keys
         ],
         loop=document.loop,
+        selection=_count_of(document.selection),
+        isolated=session.isolated is not None,
     )
+
+
+def _count_of(selection: Selection | None) -> server_messages.SelectionCount | None:
+    if selection is None:
+        return None
+    return server_messages.SelectionCount(count=selection.count, total=selection.total)
 
 
 def dragged_of(drag: int, seq: int, moved: Moved) -> server_messages.Dragged:

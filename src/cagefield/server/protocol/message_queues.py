@@ -44,6 +44,11 @@ class SendQueue:
         """One picture more; there are never more than two on their way."""
         self._append(None, content)
 
+    def put_highlight(self, content: bytes) -> None:
+        """A highlight of the selected elements; one that waits is not sent."""
+        self.waiting = deque(item for item in self.waiting if item[0] != "highlight")
+        self._append("highlight", content)
+
     def end(self) -> None:
         """End the queue after its waiting messages."""
         self._append(None, None)

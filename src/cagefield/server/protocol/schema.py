@@ -11,7 +11,12 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from cagefield.server.protocol.client_messages import PageMessage
-from cagefield.server.protocol.server_messages import EditsHeader, PictureHeader, ServerMessage
+from cagefield.server.protocol.server_messages import (
+    EditsHeader,
+    HighlightHeader,
+    PictureHeader,
+    ServerMessage,
+)
 
 _REF = "#/definitions/{model}"
 _NUMBER = {"type": "number"}
@@ -31,7 +36,7 @@ def schema() -> dict[str, Any]:
     server = TypeAdapter(ServerMessage).json_schema(ref_template=_REF)
     headers = {
         header.__name__: TypeAdapter(header).json_schema(ref_template=_REF)
-        for header in (PictureHeader, EditsHeader)
+        for header in (PictureHeader, EditsHeader, HighlightHeader)
     }
     definitions = {**page.pop("$defs"), **_complete({**server.pop("$defs"), **headers})}
     definitions |= {"PageMessage": page, "ServerMessage": server}

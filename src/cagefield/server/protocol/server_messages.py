@@ -79,6 +79,13 @@ class EditState(Message):
     """Why the edit cannot be shown, in a sentence with its cure; it is left out of the picture until then."""
 
 
+class SelectionCount(Message):
+    """Number of selected elements of the field, splats or cells of a grid, and of all."""
+
+    count: int
+    total: int
+
+
 class State(Message):
     """Everything that pages show of the edits; sent to all pages after each change."""
 
@@ -100,6 +107,10 @@ class State(Message):
     preserve_opacity: bool
     keys: list[Key]
     loop: bool
+    selection: SelectionCount | None
+    """Selected elements of the field; None for none."""
+    isolated: bool
+    """True where pictures show isolated elements alone."""
 
     def redundancy_key(self) -> str:
         return self.type
@@ -128,8 +139,19 @@ class Still(Message):
     fov_y_deg: float
 
 
+class HistogramCounts(Message):
+    """Counts of an attribute's values in even bins between two ends; of sizes, even in their logarithm."""
+
+    low: float
+    high: float
+    counts: list[int]
+    selected: list[int]
+
+
 class Answer(Message):
-    """The answer to an `ask`: a point and its normal, a text, a grid, the path, or sources; or nothing."""
+    """The answer to an `ask`: a point and its normal, a text, a grid, the path, sources, or a histogram; or
+    nothing.
+    """
 
     type: Literal["answer"] = "answer"
     request: int
@@ -142,6 +164,7 @@ class Answer(Message):
     """The path's cameras, evenly spread over its time, from its beginning to its end."""
     sources: list[str] = Field(default_factory=list)
     """Scene folders and files of splats under the server's root that can be pasted."""
+    histogram: HistogramCounts | None = None
     failed: bool = False
     """True where it could not be found out; a notice says why."""
 
@@ -254,3 +277,17 @@ class EditsHeader(Message):
     why: str | None
     map_ms: float
     encode_ms: float
+
+
+class HighlightHeader(Message):
+    """Heads a binary message with positions at which selected elements are seen, after each change of them.
+
+    `count` positions follow the header, each as uint16 (little endian) x, y, z: 0 at `low`, 65535 at `high`.
+    """
+
+    type: Literal["highlight"] = "highlight"
+    count: int
+    low: Vec3
+    high: Vec3
+    size: float
+    """Edge of the square that shows an element, world units."""

@@ -6,6 +6,7 @@ from cagefield.server.protocol import server_messages
 from cagefield.server.protocol.common import Message
 from cagefield.server.render_queue.dispatcher import Stamp
 from cagefield.server.render_queue.requests import EditsRequest, Request
+from cagefield.server.render_worker.picks import Highlight
 from cagefield.server.render_worker.refinement import FINAL
 from cagefield.server.render_worker.tasks import EditsDone, Failed, PictureDone
 
@@ -56,6 +57,14 @@ def edits_message(request: EditsRequest, stamp: Stamp, done: EditsDone | Failed)
         encode_ms=1e3 * done.encode_seconds if isinstance(done, EditsDone) else 0.0,
     )
     return _binary(header, done.content if isinstance(done, EditsDone) else b"")
+
+
+def highlight_message(highlight: Highlight) -> bytes:
+    """The binary message of a highlight of selected elements."""
+    header = server_messages.HighlightHeader(
+        count=highlight.count, low=highlight.low, high=highlight.high, size=highlight.size
+    )
+    return _binary(header, highlight.points)
 
 
 def _binary(header: Message, *parts: bytes) -> bytes:

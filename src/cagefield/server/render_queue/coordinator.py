@@ -13,6 +13,7 @@ import numpy as np
 from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack
 from cagefield.fields.splat_field import SplatField
+from cagefield.selection.element_selection import Selection
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import server_messages
@@ -23,6 +24,7 @@ from cagefield.server.render_queue.background import BackgroundWork
 from cagefield.server.render_queue.binary_messages import edits_message, picture_message
 from cagefield.server.render_queue.damage import WHOLE, Rect, screen_bounds
 from cagefield.server.render_queue.dispatcher import BackgroundTask, Dispatcher, Stamp, TooManyError
+from cagefield.server.render_queue.highlights import Highlights
 from cagefield.server.render_queue.patch_extent import PatchExtent
 from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_queue.splat_extent import splat_extent
@@ -37,6 +39,9 @@ from cagefield.server.render_worker.tasks import (
     values_of,
 )
 from cagefield.server.render_worker.view import Display
+
+Options = tuple[bool, Selection | None]
+"""Options that change all of a picture: the opacity choice, and isolated elements."""
 
 
 @dataclass
@@ -81,6 +86,7 @@ class Coordinator:
         worker.files, worker.write_opened = store.files, store.write_opened
         worker.background = store.scene.background
         self.background = BackgroundWork(session, store, self._measured, self.broadcast)
+        self.highlights = Highlights(session, self._numbered_shown, self._send_highlight)
         self.greeting: str | None = None
         """A line for the pages that come."""
         self._replaced: str | None = None
@@ -93,8 +99,8 @@ class Coordinator:
         self._pictured = session.revision
         """The first revision that is shown as `_shown`."""
         self._pictures = 0
-        self._stacks: dict[int, tuple[EditStack, bool]] = {}
-        """The edits and the opacity choice of pictures' revisions, of those that pages may still show."""
+        self._stacks: dict[int, tuple[EditStack, Options]] = {}
+        """The edits and the options of pictures' revisions, of those that pages may still show."""
         self._trouble: str | None = None
         self._asking: set[int] = set()
         """Pages of which a picture is made for a download."""
@@ -122,6 +128,8 @@ class Coordinator:
         page.send_queue.put(self.background.preparing())
         for job in self.background.jobs():
             page.send_queue.put(job)
+        if self.highlights.message is not None:
+            page.send_queue.put_highlight(self.highlights.message)
         return page
 
     def leave(self, page: Page) -> None:
@@ -278,8 +286,8 @@ class Coordinator:
         stacks = [self._stack(revision) for revision in (one, another)]
         if camera is None or None in stacks:
             return WHOLE
-        (before, opacity), (after, other) = (stack for stack in stacks if stack is not None)
-        if opacity != other:
+        (before, options), (after, others) = (stack for stack in stacks if stack is not None)
+        if options != others:
             return WHOLE
         beside = np.array([[-self.spread], [self.spread]])
         changed = after.changed_boxes(before, lambda step: self._patches.boxes(step.edit))
@@ -300,7 +308,16 @@ class Coordinator:
 
     def background_task(self) -> BackgroundTask | None:
         """Next background task while no page waits for an image, or None."""
-        return self.background.next(self.dispatcher.scheduler.generation)
+        generation = self.dispatcher.scheduler.generation
+        return self.highlights.next(generation) or self.background.next(generation)
+
+    def _numbered_shown(self) -> tuple[int, Shown]:
+        """Number of the pictures' revision, and its content."""
+        return self._pictures, self._shown
+
+    def _send_highlight(self, content: bytes) -> None:
+        for page in self.pages.values():
+            page.send_queue.put_highlight(content)
 
     def _tell_preview(self) -> None:
         """Tells the pages which preview is over, and which has begun."""
@@ -325,16 +342,21 @@ class Coordinator:
     def _measured(self) -> None:
         self.broadcast(self.state())
 
-    def _stack(self, revision: int) -> tuple[EditStack, bool] | None:
+    def _stack(self, revision: int) -> tuple[EditStack, Options] | None:
         if revision == self._pictures:
-            return EditStack(self._drawn), self._shown.preserve_opacity
+            return EditStack(self._drawn), _options_of(self._shown)
         return self._stacks.get(revision)
 
     def _keep_stack(self) -> None:
         """Store the shown stack before it changes."""
         wanted = self.dispatcher.scheduler.remembered()
         self._stacks = {number: stack for number, stack in self._stacks.items() if number in wanted}
-        self._stacks[self._pictures] = EditStack(self._drawn), self._shown.preserve_opacity
+        self._stacks[self._pictures] = EditStack(self._drawn), _options_of(self._shown)
 
     def _what_is_shown(self) -> Shown:
-        return Shown(values_of(self.session.drawn()), self.session.shown.preserve_opacity)
+        session = self.session
+        return Shown(values_of(session.drawn()), session.shown.preserve_opacity, session.isolated)
+
+
+def _options_of(shown: Shown) -> Options:
+    return shown.preserve_opacity, shown.isolated

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from cagefield.completion.patcher import PatchStage
-from cagefield.edits import Continuous, Edit
+from cagefield.edits import Continuous, Edit, PreparedStack
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.render_worker.refinement import FINAL, Refinement
 
 if TYPE_CHECKING:
-    from cagefield.completion.patcher import Patcher
     from cagefield.rendering.renderers import InteractiveRenderer
 
 QUICK_LATTICE = 32
@@ -21,6 +20,23 @@ QUICK_LATTICE = 32
 
 KEPT_FINAL = 2
 """Final renderers that are kept: of the pages' pictures, and of a job's."""
+
+
+class PatchSource(Protocol):
+    """Source of prepared edits: a `Patcher`, or one without patches."""
+
+    def prepare(
+        self,
+        edits: Sequence[Edit],
+        *,
+        stage: PatchStage = ...,
+        preserve_opacity: bool = ...,
+        proceed: Callable[[], None] | None = ...,
+    ) -> PreparedStack:
+        """Stack of the edits with their patches of a stage (`Patcher.prepare`)."""
+
+    def attained_stage(self, edits: Sequence[Edit]) -> PatchStage:
+        """Last stage whose patches are those of stage CACHED (`Patcher.attained_stage`)."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +60,7 @@ class RefinedRenderer:
 class EditedRenderers:
     """See the module."""
 
-    def __init__(self, plain: InteractiveRenderer, is_sampled: bool, patcher: Patcher) -> None:
+    def __init__(self, plain: InteractiveRenderer, is_sampled: bool, patcher: PatchSource) -> None:
         """`is_sampled`: rays are sampled, and samples mapped; lattices are for those alone."""
         self._plain, self._is_sampled, self._patcher = plain, is_sampled, patcher
         self._coarse: IdentityCache[Edit, Edit] = IdentityCache(32)
@@ -116,7 +132,7 @@ PATCH_STAGES = {
 """Patches of each refinement."""
 
 
-def attained_refinement(made: Refinement, edits: Sequence[Edit], patcher: Patcher) -> Refinement:
+def attained_refinement(made: Refinement, edits: Sequence[Edit], patcher: PatchSource) -> Refinement:
     """The last refinement that a picture of edits `made` with one has: those after it change nothing."""
     patches = patcher.attained_stage(edits)
     is_coarse = made.is_coarse and any(

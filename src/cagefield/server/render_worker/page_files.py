@@ -30,6 +30,8 @@ KEPT_OCCUPANCIES = 6
 
 NOT_DRAWN = "pages draw voxels and splats alone; the server draws this scene"
 
+ISOLATED = "elements are isolated; the server draws them"
+
 
 class PageFiles:
     """Builder of the page files of one scene; layers of voxels that a page has are not sent again."""
@@ -53,6 +55,8 @@ class PageFiles:
 
     def edits(self, task: PageEditsTask, stop: Stop) -> EditsDone | Stopped:
         """The edits' file, or the part of it that the page has not. Raises EditError, CagefieldError."""
+        if task.shown.isolated is not None:
+            raise CagefieldError(ISOLATED)
         began = time.perf_counter()
         edits = self._renderers.edits(task.shown.edits)
         self._for_page.keep_only(self._renderers.known_edits)

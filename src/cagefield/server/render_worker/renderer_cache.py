@@ -21,6 +21,7 @@ from cagefield.scene.scene import Scene
 from cagefield.server.render_worker import encoding
 from cagefield.server.render_worker.cancellation import GivenUpError, Stop, cancellation_check
 from cagefield.server.render_worker.edited_renderers import EditedRenderers, RefinedRenderer
+from cagefield.server.render_worker.isolated_renderers import IsolatedRenderers
 from cagefield.server.render_worker.refinement import FINAL, Refinement
 from cagefield.server.render_worker.tasks import (
     EditValues,
@@ -62,6 +63,7 @@ class RendererCache:
         """Whether rays are sampled, and samples mapped: lattices and steps are for those alone."""
         self._edits: list[Edit] = []
         self.edited = EditedRenderers(self.plain, self._is_sampled, scene.patcher)
+        self._isolated = IsolatedRenderers(scene.field)
         lower, upper = scene.field.bounds
         self._middle = 0.5 * (lower + upper)
         self._radius = 0.5 * float(np.linalg.norm(upper - lower))
@@ -70,7 +72,7 @@ class RendererCache:
         """The part of a picture that a task asks for, encoded."""
         began = time.perf_counter()
         try:
-            attained, renderer = FINAL, self.plain
+            attained, renderer = FINAL, self._renderers_of(task.shown)[0]
             if not task.display.before:
                 refined = self.renderer(task.shown, task.refinement, cancellation_check(stop))
                 attained, renderer = refined.refinement, refined.renderer
@@ -104,7 +106,7 @@ class RendererCache:
         region = Region(0, 0, camera.width, camera.height, camera.width, camera.height)
         task = PictureTask(0, shown, camera, region, display, stop is None, FINAL, 0)
         stopping = stop or (lambda: False)
-        renderer = self.plain
+        renderer = self._renderers_of(shown)[0]
         if not display.before:
             renderer = self.renderer(shown, FINAL, cancellation_check(stopping)).renderer
         return self._frame(task, renderer, stopping)
@@ -133,7 +135,15 @@ class RendererCache:
         self, shown: Shown, refinement: Refinement, proceed: Callable[[], None] | None = None
     ) -> RefinedRenderer:
         """The renderer of the edits with a refinement (`EditedRenderers.renderer`)."""
-        return self.edited.renderer(self.edits(shown.edits), shown.preserve_opacity, refinement, proceed)
+        edits = self.edits(shown.edits)
+        edited = self._renderers_of(shown)[1]
+        return edited.renderer(edits, shown.preserve_opacity, refinement, proceed)
+
+    def _renderers_of(self, shown: Shown) -> tuple[InteractiveRenderer, EditedRenderers]:
+        """(renderer without edits, edited renderers) of the field, or of its isolated elements."""
+        if shown.isolated is None:
+            return self.plain, self.edited
+        return self._isolated.renderers(shown.isolated)
 
     def edits(self, values: tuple[EditValues, ...]) -> list[Edit]:
         """Edits with these field values; unchanged ones are the same objects as before.
@@ -168,7 +178,8 @@ class RendererCache:
             return self.part(task, edited, region, stop)
         left = min(max(round(split * region.full_width) - region.x, 0), region.width)
         parts: list[RenderResult] = []
-        for renderer, x, width in ((self.plain, 0, left), (edited, left, region.width - left)):
+        plain = self._renderers_of(task.shown)[0]
+        for renderer, x, width in ((plain, 0, left), (edited, left, region.width - left)):
             if width > 0:
                 parts.append(self.part(task, renderer, replace(region, x=region.x + x, width=width), stop))
         return parts[0] if len(parts) == 1 else _beside(parts[0], parts[1])

@@ -21,18 +21,23 @@ from cagefield.server.render_worker.job_files import JobFiles
 from cagefield.server.render_worker.page_files import PageFiles
 from cagefield.server.render_worker.refinement import Refinement
 from cagefield.server.render_worker.renderer_cache import RendererCache
+from cagefield.server.render_worker.selection_handlers import SelectionHandlers
 from cagefield.server.render_worker.splat_density import dense_cells
 from cagefield.server.render_worker.tasks import (
     Answered,
+    BoxTask,
     EndJobTask,
     ErrorTask,
     FitTask,
     FrameTask,
     GridTask,
+    HighlightTask,
+    HistogramTask,
     LightTask,
     LookTask,
     PageEditsTask,
     PageFieldTask,
+    PickTask,
     PictureTask,
     Result,
     StillTask,
@@ -59,6 +64,7 @@ class TaskHandlers:
         self._renderers = renderers
         self._files = JobFiles()
         self._pages = PageFiles(renderers)
+        self._selections = SelectionHandlers(renderers)
 
     def do(self, task: Task, abandoned: Abandoned) -> Result:
         """The task's result. Raises CagefieldError where it cannot be done."""
@@ -74,6 +80,10 @@ class TaskHandlers:
             return self._error(task, lambda: abandoned(task.generation))
         if isinstance(task, StillTask):
             return self._still(task, lambda: abandoned(task.generation))
+        if isinstance(task, HighlightTask):
+            return self._highlight(task, lambda: abandoned(task.generation))
+        if isinstance(task, PickTask | BoxTask | HistogramTask):
+            return Answered(task.number, self._selections.answer(task))
         return Answered(task.number, self._answer(task))
 
     def close(self) -> None:
@@ -97,6 +107,12 @@ class TaskHandlers:
         if isinstance(task, PageFieldTask):
             return self._pages.field()
         return grid_lines(task.edit.edit())
+
+    def _highlight(self, task: HighlightTask, stop: Callable[[], bool]) -> Result:
+        try:
+            return Answered(task.number, self._selections.answer(task, cancellation_check(stop)))
+        except GivenUpError:
+            return Stopped(task.number)
 
     def _light(self, task: LightTask, stop: Callable[[], bool]) -> Result:
         try:

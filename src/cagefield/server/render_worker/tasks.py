@@ -11,6 +11,9 @@ from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Still
 from cagefield.edits import Edit
 from cagefield.geometry.cage import Cage
+from cagefield.selection.element_selection import Selection
+from cagefield.selection.elements import Attribute
+from cagefield.server.render_worker.picks import Pick
 from cagefield.server.render_worker.refinement import Refinement
 from cagefield.server.render_worker.view import Display, Region
 
@@ -48,10 +51,14 @@ def values_of(edits: tuple[Edit, ...]) -> tuple[EditValues, ...]:
 
 @dataclass(frozen=True)
 class Shown:
-    """Content of an image: edits (see `values_of`) and the scene's opacity choice."""
+    """Content of an image: edits (see `values_of`), the scene's opacity choice, and isolated elements.
+
+    With `isolated` elements the field has no others, and edits show no patches and no pastes.
+    """
 
     edits: tuple[EditValues, ...]
     preserve_opacity: bool = True
+    isolated: Selection | None = None
 
 
 @dataclass(frozen=True)
@@ -192,6 +199,46 @@ class PageEditsTask:
     generation: int
 
 
+@dataclass(frozen=True)
+class PickTask:
+    """Selection of the picked elements."""
+
+    number: int
+    shown: Shown
+    pick: Pick
+
+
+@dataclass(frozen=True)
+class HistogramTask:
+    """Histogram of an attribute, with the selected elements."""
+
+    number: int
+    attribute: Attribute
+    selection: Selection | None
+
+
+@dataclass(frozen=True)
+class BoxTask:
+    """Corners of an oriented box around the selected elements as edits show them; `margin` in cells."""
+
+    number: int
+    shown: Shown
+    selection: Selection
+    margin: float
+
+
+@dataclass(frozen=True)
+class HighlightTask:
+    """Positions at which the selected elements are seen; abandoned with its generation."""
+
+    number: int
+    shown: Shown
+    selection: Selection
+    generation: int
+
+
+SelectionTask: TypeAlias = PickTask | HistogramTask | BoxTask | HighlightTask
+
 Task: TypeAlias = (
     PictureTask
     | StillTask
@@ -206,6 +253,7 @@ Task: TypeAlias = (
     | EndJobTask
     | PageFieldTask
     | PageEditsTask
+    | SelectionTask
 )
 
 

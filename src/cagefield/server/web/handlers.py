@@ -15,7 +15,7 @@ from cagefield.server.editor.cage_placement import fit_to_content
 from cagefield.server.editor.edit_texts import read_edits
 from cagefield.server.editor.pasting import build_paste
 from cagefield.server.editor.session import Session
-from cagefield.server.protocol import client_messages, common, server_messages
+from cagefield.server.protocol import client_messages, common, selection_messages, server_messages
 from cagefield.server.protocol.conversion import (
     cage_of,
     camera_of,
@@ -36,6 +36,7 @@ from cagefield.server.render_worker.tasks import (
     values_of,
 )
 from cagefield.server.render_worker.view import Display
+from cagefield.server.web.selection_handlers import change_selection, histogram_of
 from cagefield.server.web.worker_threads import run_in_thread
 from cagefield.typing import Array
 
@@ -132,6 +133,9 @@ class MessageHandlers:
             return server_messages.Answer(request=message.request, sources=sources)
         if message.what == "grid":
             return server_messages.Answer(request=message.request, grid=await self._grid(message.edit))
+        if message.what == "histogram":
+            counts = await histogram_of(self._coordinator, message.attribute)
+            return server_messages.Answer(request=message.request, histogram=counts)
         if message.what == "path":
             document = self._session.document
             return server_messages.Answer(
@@ -278,6 +282,19 @@ class MessageHandlers:
     @_handles(client_messages.OuterMargin)
     def _outer_margin(self, message: client_messages.OuterMargin) -> None:
         self._session.outer_margin(message.edit, message.margin)
+        self._coordinator.changed()
+
+    # ---- selected elements ----
+
+    @_handles(selection_messages.SelectRegion)
+    @_handles(selection_messages.SelectRange)
+    @_handles(selection_messages.SelectFlood)
+    @_handles(selection_messages.SelectFloaters)
+    @_handles(selection_messages.ChangeSelection)
+    @_handles(selection_messages.SelectionCage)
+    @_handles(selection_messages.Isolate)
+    async def _select_elements(self, message: selection_messages.SelectionMessage) -> None:
+        await change_selection(self._coordinator, self._page, message)
         self._coordinator.changed()
 
     # ---- options and the list ----

@@ -1,0 +1,141 @@
+"""`cagefield select`: elements of a scene's field by criteria, a cage around them, the scene without them."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import tyro
+
+from cagefield.cli.options import Flag, OptionalOutput
+from cagefield.errors import CagefieldError
+
+if TYPE_CHECKING:
+    from cagefield.scene.scene import Scene
+    from cagefield.selection import Elements
+    from cagefield.selection.element_positions import DeformedPositions
+    from cagefield.typing import Mask
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Select:
+    """Select splats, or cells of voxels, that meet every criterion given; then grow, shrink, invert."""
+
+    scene: tyro.conf.Positional[Path]
+    """Scene folder."""
+    flood: tuple[float, float, float] | None = None
+    """Connected to the element nearest to X Y Z, world units, as the scene's edits show it."""
+    flood_opacity: float = 0.3
+    """Opacity from which on a flood goes through a cell."""
+    flood_reach: float | None = None
+    """Bound of a flood's distance from its point, world units."""
+    floaters: float | None = None
+    """Probable floaters, of a strength from 0 to 1."""
+    size: Range | None = None
+    """Splats whose largest standard deviation is between LOW and HIGH, world units."""
+    opacity: Range | None = None
+    """Opacity between LOW and HIGH, of [0, 1]."""
+    red: Range | None = None
+    """Red between LOW and HIGH, of [0, 1]; so are the other colors."""
+    green: Range | None = None
+    blue: Range | None = None
+    hue: Range | None = None
+    saturation: Range | None = None
+    value: Range | None = None
+    grow: int = 0
+    """Cells by which the selection grows."""
+    shrink: int = 0
+    """Cells by which it then shrinks."""
+    invert: Flag = False
+    """Select all others instead."""
+    to_cage: Path | None = None
+    """Write an edit file with a continuous edit whose inner cage is a box around the selection."""
+    margin: float | None = None
+    """Distance from the selection to the cage, world units; left out, the edge of a cell."""
+    remove: Flag = False
+    """Write the scene without the selected elements to -o."""
+    out: OptionalOutput = None
+    """New scene folder, for --remove."""
+    overwrite: Flag = False
+    """Replace the scene or the edit file that is there."""
+
+    def run(self) -> None:
+        """Prints the number of selected elements, and writes the cage or the scene."""
+        from cagefield.edits import EditStack
+        from cagefield.scene.scene import Scene
+        from cagefield.scene.scene_files import check_destination
+        from cagefield.selection.element_positions import deformed_positions
+        from cagefield.selection.field_elements import elements_of_field
+
+        if self.remove != (self.out is not None):
+            raise CagefieldError("--remove writes a new scene: give both --remove and -o NEW_SCENE")
+        if self.to_cage is not None and self.to_cage.exists() and not self.overwrite:
+            raise CagefieldError(f"{self.to_cage} exists already; give another name, or --overwrite")
+        if self.out is not None:
+            check_destination(self.out, self.overwrite)
+        scene = Scene.open(self.scene)
+        elements = elements_of_field(scene.field)
+        seen = deformed_positions(elements.positions, EditStack(scene.edits))
+        mask = self._selected(elements, seen)
+        noun = "splats" if elements.kind == "splats" else "cells"
+        print(f"{np.count_nonzero(mask)} of {len(mask)} {noun} selected")
+        if self.to_cage is not None:
+            self._write_cage(elements, seen, mask, self.to_cage)
+        if self.out is not None:
+            self._write_rest(scene, elements, mask, self.out)
+
+    def _selected(self, elements: Elements, seen: DeformedPositions) -> Mask:
+        from cagefield.selection.elements import ATTRIBUTES
+        from cagefield.selection.floater_preset import floaters
+        from cagefield.selection.neighborhoods import flood, grow, shrink
+
+        if min(self.grow, self.shrink) < 0:
+            raise CagefieldError("--grow and --shrink are numbers of cells, 0 or more")
+        ranges = {name: getattr(self, name) for name in ATTRIBUTES if getattr(self, name) is not None}
+        if self.flood is None and self.floaters is None and not ranges:
+            raise CagefieldError(
+                "nothing says which elements: give --flood X Y Z, --floaters STRENGTH, or a range such as "
+                "--opacity 0 0.1"
+            )
+        mask = np.ones(len(elements), bool)
+        if self.flood is not None:
+            if not len(seen.points):
+                raise CagefieldError("the scene has nothing to flood: all of it is transparent or deleted")
+            nearest = np.argmin(((seen.points - np.array(self.flood)) ** 2).sum(axis=1))
+            seed = int(seen.element[nearest])
+            mask &= flood(elements, seed, self.flood_opacity, self.flood_reach)
+        if self.floaters is not None:
+            mask &= floaters(elements, self.floaters)
+        for name, (low, high) in ranges.items():
+            mask &= elements.in_range(name, low, high)
+        mask = grow(elements, mask, self.grow) if self.grow else mask
+        mask = shrink(elements, mask, self.shrink) if self.shrink else mask
+        return ~mask if self.invert else mask
+
+    def _write_cage(self, elements: Elements, seen: DeformedPositions, mask: Mask, path: Path) -> None:
+        from cagefield.edits import Edit, EditStack, save_edits
+        from cagefield.selection.bounding_cages import oriented_box, outer_cage_of_box
+
+        seen = seen.take(mask[seen.element])
+        margin = elements.cell_edge if self.margin is None else self.margin
+        inner = oriented_box(seen.points, margin=margin, radii=elements.radii[seen.element])
+        edit = Edit.continuous(inner, outer_cage_of_box(inner), name="selection")
+        save_edits(EditStack([edit]), path)
+        print(f"cage written to {path}; apply it after the scene's edits with `cagefield edit --append`")
+
+    def _write_rest(self, scene: Scene, elements: Elements, mask: Mask, out: Path) -> None:
+        from cagefield.selection.field_elements import without_elements
+
+        if scene.original is not None:
+            raise CagefieldError(
+                "the scene has the NeRF that its voxels were baked from, of which nothing can be removed; "
+                "delete with a cage (--to-cage), or bake voxels alone"
+            )
+        rest = without_elements(scene.field, elements, mask)
+        dataclasses.replace(scene, field=rest).save(out, self.overwrite)
+        print(f"scene without them written to {out}")
