@@ -127,7 +127,7 @@ def test_steps_are_those_of_the_cpu(lens: str, channels: int) -> None:
     for number in range(3):
         want, got = (compared(one, view, photo, **options) for one in (cpu, device))
         np.testing.assert_allclose(got, want, rtol=1e-3, atol=1e-3)
-        assert np.abs(device.slopes() - cpu.slopes()).max() < 2e-3 * np.abs(cpu.slopes()).max()
+        assert np.abs(device.slopes() - cpu.slopes()).max() < 4e-3 * np.abs(cpu.slopes()).max()
         if number == 0:
             for name in SCRATCH:
                 assert_close(getattr(device.state, name), getattr(cpu.state, name), 1e-3, name)

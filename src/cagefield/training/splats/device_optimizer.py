@@ -104,7 +104,7 @@ class DeviceSplatOptimizer:
             seen.tiles,
             seen.across,
             self._image,
-            device_pixels.T_MIN,
+            device_pixels.MIN_PIXEL_TRANSMITTANCE,
             COLOR,
         )
 

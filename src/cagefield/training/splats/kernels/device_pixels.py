@@ -14,7 +14,7 @@ from cagefield.rendering.splats.kernels.projection import ALPHA_MAX, ALPHA_MIN, 
 from cagefield.rendering.voxels.kernels.grid import F32, I32, vec3
 from cagefield.training.splats.kernels.device_args import PhotoArgs, photo_value
 
-T_MIN = 1e-4
+MIN_PIXEL_TRANSMITTANCE = 1e-4
 """Transmittance below which a pixel is left; the CPU leaves a tile once all of its pixels are below 1e-3."""
 
 TILE_SUMS = 7
@@ -112,7 +112,7 @@ def gradients(
             rest = image
             e = starts[t]
             end = starts[t + 1]
-            while e < end and T >= T_MIN:
+            while e < end and T >= MIN_PIXEL_TRANSMITTANCE:
                 row = PACKED * ids[e]
                 alpha = splat_at(packed, row, x, y)[3]
                 if alpha > 0.0:
@@ -124,7 +124,7 @@ def gradients(
             T = 1.0
             rest = image
             e = starts[t]
-            while e < end and T >= T_MIN:
+            while e < end and T >= MIN_PIXEL_TRANSMITTANCE:
                 splat = ids[e]
                 row = PACKED * splat
                 here = splat_at(packed, row, x, y)

@@ -10,9 +10,8 @@ from cagefield.rendering.splats.kernels.projection import AREA, TILE_PX
 from cagefield.rendering.voxels.kernels.grid import F32, vec3
 from cagefield.training.splats.kernels import ssim
 from cagefield.training.splats.kernels.device_args import PhotoArgs, photo_value
+from cagefield.training.splats.kernels.ssim import MOMENT_PLANES, WINDOW_PIXELS
 
-MOMENT_PLANES = ssim.MOMENT_PLANES
-WINDOW_PIXELS = ssim.WINDOW_PIXELS
 HALF = WINDOW_PIXELS // 2
 WEIGHTS = tuple(float(weight) for weight in ssim.WINDOW_WEIGHTS)
 C1, C2 = float(ssim.C1), float(ssim.C2)

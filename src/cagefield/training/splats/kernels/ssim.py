@@ -23,8 +23,8 @@ MOMENT_PLANES = 5
 
 _HALF = WINDOW_PIXELS // 2
 _OFFSETS = np.arange(WINDOW_PIXELS) - _HALF
-WINDOW_WEIGHTS = np.exp(-0.5 * (_OFFSETS / 1.5) ** 2)
-WINDOW_WEIGHTS = (WINDOW_WEIGHTS / WINDOW_WEIGHTS.sum()).astype(np.float32)
+_GAUSSIAN = np.exp(-0.5 * (_OFFSETS / 1.5) ** 2)
+WINDOW_WEIGHTS = (_GAUSSIAN / _GAUSSIAN.sum()).astype(np.float32)
 C1, C2 = np.float32(0.01**2), np.float32(0.03**2)
 
 
