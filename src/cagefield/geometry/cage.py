@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal, TypeAlias
+from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,6 +47,15 @@ class Cage:
     corners: Array
     pivot: Array = field(default=None, kw_only=True)  # type: ignore[arg-type]
 
+    is_hexahedron: ClassVar[bool] = True
+    """False for cages of other shapes, whose `corners` are those of a box around them."""
+
+    handle_noun: ClassVar[str] = "inner corner"
+    """One of `handles`, in messages."""
+
+    plural_noun: ClassVar[str] = "cages"
+    """Such cages, in messages."""
+
     def __post_init__(self) -> None:
         corners = read_only(self.corners, (8, 3), "cage corners")
         pivot = corners.mean(axis=0) if self.pivot is None else self.pivot
@@ -66,7 +75,7 @@ class Cage:
         return cls(c + offsets, pivot=c)
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Cage):
+        if type(self) is not type(other) or not isinstance(other, Cage):
             return NotImplemented
         return np.array_equal(self.corners, other.corners) and np.array_equal(self.pivot, other.pivot)
 
@@ -75,6 +84,15 @@ class Cage:
 
     def __repr__(self) -> str:
         return f"Cage(corners={self.corners.tolist()})"
+
+    @property
+    def handles(self) -> Array:
+        """Points [n,3] by which the cage is moved, all of which an outer cage must hold: its corners."""
+        return self.corners
+
+    def has_shape_of(self, other: Cage) -> bool:
+        """True where another cage of this kind lies in the same place, but for its pivot."""
+        return type(self) is type(other) and np.array_equal(self.corners, other.corners)
 
     @property
     def center(self) -> Array:
