@@ -102,11 +102,13 @@ def _details(edit: Edit, content: _Content) -> Iterable[str]:
     if not edit.changes_anything:
         yield "changes nothing: the inner cage is where it was"
         return
-    reach = np.linalg.norm(edit.deformed.corners - edit.inner.corners, axis=1).max()
+    reach = np.linalg.norm(edit.deformed.handles - edit.inner.handles, axis=1).max()
+    handles = "corners" if edit.inner.is_hexahedron else "points"
     growth = _volume(edit.deformed) / _volume(edit.inner)
+    volume = f"; its volume becomes {growth:.3g} times what it was" if edit.inner.is_hexahedron else ""
     yield (
-        f"{share:.1%} of the field's {content.noun} follow the cage, whose corners move by up to "
-        f"{reach:.4g}; its volume becomes {growth:.3g} times what it was"
+        f"{share:.1%} of the field's {content.noun} follow the cage, whose {handles} move by up to "
+        f"{reach:.4g}{volume}"
     )
     try:
         warp = edit.exact_warp

@@ -40,11 +40,14 @@ from cagefield.geometry.cage import Axes, Cage
 from cagefield.geometry.cage_checks import format_vector
 from cagefield.geometry.face_distance import outside_by
 from cagefield.typing import Array, Float32
-from cagefield.warps import FlowShell, Shell, Warp
+from cagefield.warps import FlowShell, FreeFormFlow, Shell, Warp, inner_map_between
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.hexahedron_map import HexahedronMap
 from cagefield.warps.lattice import Lattice
+
+FREE_FORM_LATTICE = 64
+"""Nodes per axis with which kernels show an inner cage that is no hexahedron, where nothing else is said."""
 
 CHUNK_POINTS = 500
 """Points at which a lattice is compared with the exact map at a time: hundredths of a second."""
@@ -318,7 +321,7 @@ class Edit(ABC):
 
     @cached_property
     def _is_moved(self) -> bool:
-        return not np.array_equal(self.inner.corners, self.deformed.corners)
+        return not self.inner.has_shape_of(self.deformed)
 
 
 @dataclass(frozen=True)
@@ -348,6 +351,7 @@ class Continuous(Edit):
             )
         if not isinstance(self.shell, ShellKind):
             self._refuse(f"shell must be Flow(...) or Trilinear(), got {self.shell!r:.60}")
+        self._refuse(self.shell.problem_of_inner(self.inner))
         self._refuse(problem_of_lattice(self.lattice))
         super().__post_init__()
 
@@ -374,7 +378,8 @@ class Continuous(Edit):
     @cached_property
     def exact_warp(self) -> ContinuousWarp:
         self.check()
-        return ContinuousWarp(HexahedronMap(self.inner, self.deformed), self.outer, self._last_shell)
+        inner = inner_map_between(self.inner, self.deformed)
+        return ContinuousWarp(inner, self.outer, self._last_shell)
 
     @cached_property
     def warp(self) -> ContinuousWarp:
@@ -386,11 +391,22 @@ class Continuous(Edit):
         exact = self.exact_warp
         if self.lattice is None:
             return exact
-        if isinstance(exact.shell, FlowShell):
+        if isinstance(exact.shell, FlowShell | FreeFormFlow):
             with suppress(DeviceError):
                 return replace(exact, lattice=self._kernel_lattice)
         lattice = Lattice.sample(lambda p: exact.to_canonical(p).points, exact.outer, self.lattice)
         return replace(exact, lattice=lattice)
+
+    @property
+    def kernel_lattice(self) -> int | None:
+        """Nodes per axis from which kernels interpolate the map; None where they evaluate it exactly.
+
+        Kernels have no exact map of an inner cage that is no hexahedron: it has
+        `FREE_FORM_LATTICE` of them without a `lattice`.
+        """
+        if self.lattice is None and not self.inner.is_hexahedron:
+            return FREE_FORM_LATTICE
+        return self.lattice
 
     @property
     def lattice_nodes(self) -> Float32:
@@ -405,7 +421,7 @@ class Continuous(Edit):
     def _kernel_lattice(self) -> Lattice:
         """The lattice as the renderer has it, for the float64 reference. Raises as `lattice_nodes` does."""
         origin, frame = self.outer.frame
-        grid = self.lattice_nodes.reshape(*3 * (self.lattice or 0,), 3)
+        grid = self.lattice_nodes.reshape(*3 * (self.kernel_lattice or 0,), 3)
         return Lattice(origin, frame, grid.astype(np.float64))
 
     def check(self) -> None:
@@ -441,7 +457,7 @@ class Continuous(Edit):
         interpolation's error falls with R^-2 where the map is smooth and with R^-1 at the cages' faces.
         `proceed` is called now and then, and gives the measurement up by raising.
         """
-        warp, nodes = self.exact_warp, resolution if resolution is not None else self.lattice
+        warp, nodes = self.exact_warp, resolution if resolution is not None else self.kernel_lattice
         if nodes is None:
             return 0.0, 0.0
         # The kernel's, which takes no time: float32's rounding is far below the lattice's error.
@@ -463,7 +479,7 @@ class Continuous(Edit):
             except CageError:
                 return False
 
-        if isinstance(self.shell, Flow):
+        if isinstance(self.shell, Flow) and self.inner.is_hexahedron:
             if is_safe(1.0):
                 return 1.0
             for fine in (False, True):
@@ -494,15 +510,16 @@ class Continuous(Edit):
 
     def _fault(self, deformed: Cage) -> tuple[str, str]:
         """(fault, cure) with the inner cage at a `deformed` that is not safe."""
-        outside = np.flatnonzero(~self.outer.contains(deformed.corners))
+        handles = deformed.handles
+        outside = np.flatnonzero(~self.outer.contains(handles))
         if len(outside):
             face, distance, k = max(
-                ((*outside_by(self.outer, deformed.corners[k]), int(k)) for k in outside),
+                ((*outside_by(self.outer, handles[k]), int(k)) for k in outside),
                 key=lambda item: item[1],
             )
             return (
-                f"outer cage must contain the inner cage: inner corner {k} at"
-                f" {format_vector(deformed.corners[k])} is {distance:.3g} outside face {face}",
+                f"outer cage must contain the inner cage: {deformed.handle_noun} {k} at"
+                f" {format_vector(handles[k])} is {distance:.3g} outside face {face}",
                 "; enlarge the outer cage or make the edit discrete",
             )
         cure = "; reduce it, enlarge the outer cage, or make the edit discrete"
@@ -526,9 +543,9 @@ class Continuous(Edit):
 def _lattice_nodes(edit: Continuous) -> Float32:
     from cagefield.edits.device.edit_lattice import sample_nodes
 
-    if edit.lattice is None:
+    if edit.kernel_lattice is None:
         raise edit.error("only a continuous edit with a lattice has nodes")
-    return sample_nodes(edit.exact_warp, edit.lattice)
+    return sample_nodes(edit.exact_warp, edit.kernel_lattice)
 
 
 @dataclass(frozen=True)
@@ -542,6 +559,11 @@ class Discrete(Edit, ABC):
     unused_shell: ShellSettings = NO_SHELL
 
     def __post_init__(self) -> None:
+        if not self.inner.is_hexahedron:
+            self._refuse(
+                f"a {type(self).__name__.lower()} needs a cage with 8 corners, not {self.inner.plural_noun};"
+                " make the edit continuous, or use a box"
+            )
         self._refuse(problem_of_lattice(self.unused_shell.lattice))
         if isinstance(self.unused_shell.shell, Flow):
             self._refuse(problem_of_unused_falloff(self.unused_shell.shell, "discrete edit"))

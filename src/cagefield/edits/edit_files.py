@@ -112,7 +112,7 @@ def _stack(node: Node, check: bool, mend: bool) -> EditStack:
     if len(items) > MAX_EDITS:
         raise node.error(f"{len(items)} edits are too many, a file has at most {MAX_EDITS}; leave some out")
     edits = [_edit(item, check, mend) for item in items]
-    shown = (edit.lattice for edit in edits if edit.enabled and isinstance(edit, Continuous))
+    shown = (edit.kernel_lattice for edit in edits if edit.enabled and isinstance(edit, Continuous))
     if (problem := problem_of_lattices(shown)) is not None:
         if not mend:
             raise node.error(problem)

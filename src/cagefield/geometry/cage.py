@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal, TypeAlias
+from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -58,6 +58,15 @@ class Cage:
     corners: Array
     pivot: Array = field(default=None, kw_only=True)  # type: ignore[arg-type]
 
+    is_hexahedron: ClassVar[bool] = True
+    """False for cages of other shapes, whose `corners` are those of a box around them."""
+
+    handle_noun: ClassVar[str] = "inner corner"
+    """One of `handles`, in messages."""
+
+    plural_noun: ClassVar[str] = "cages"
+    """Such cages, in messages."""
+
     def __post_init__(self) -> None:
         corners = read_only(self.corners, (8, 3), "cage corners")
         pivot = corners.mean(axis=0) if self.pivot is None else self.pivot
@@ -77,10 +86,8 @@ class Cage:
         return cls(c + offsets, pivot=c)
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Cage):
+        if type(self) is not type(other) or not isinstance(other, Cage):
             return NotImplemented
-        if type(other) is not type(self):
-            return False
         return np.array_equal(self.corners, other.corners) and np.array_equal(self.pivot, other.pivot)
 
     def __hash__(self) -> int:
@@ -93,6 +100,10 @@ class Cage:
     def handles(self) -> Array:
         """Points [n,3] by which the cage is moved, all of which an outer cage must hold: its corners."""
         return self.corners
+
+    def has_shape_of(self, other: Cage) -> bool:
+        """True where another cage of this kind lies in the same place, but for its pivot."""
+        return type(self) is type(other) and np.array_equal(self.corners, other.corners)
 
     @property
     def center(self) -> Array:
@@ -314,6 +325,10 @@ class LatticeCage(LatticePoints, Cage):
     over the whole lattice (Bernstein coefficients with subdivision, `lattice_determinant`).
     """
 
+    is_hexahedron: ClassVar[bool] = False
+    handle_noun: ClassVar[str] = "control point"
+    plural_noun: ClassVar[str] = "lattices"
+
     def __init__(
         self,
         points: ArrayLike,
@@ -344,15 +359,9 @@ class LatticeCage(LatticePoints, Cage):
         return corners
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Cage):
+        if not isinstance(other, LatticeCage):
             return NotImplemented
-        return (
-            isinstance(other, LatticeCage)
-            and self.shape == other.shape
-            and self.interpolation == other.interpolation
-            and np.array_equal(self.control_points, other.control_points)
-            and np.array_equal(self.pivot, other.pivot)
-        )
+        return self.has_shape_of(other) and np.array_equal(self.pivot, other.pivot)
 
     def __hash__(self) -> int:
         return hash((self.control_points.tobytes(), self.pivot.tobytes(), self.shape, self.interpolation))
@@ -361,6 +370,15 @@ class LatticeCage(LatticePoints, Cage):
         return (
             f"LatticeCage(points={self.control_points.tolist()}, shape={self.shape},"
             f' interpolation="{self.interpolation}")'
+        )
+
+    def has_shape_of(self, other: Cage) -> bool:
+        """True where another lattice has the same control points and interpolation."""
+        return (
+            isinstance(other, LatticeCage)
+            and self.shape == other.shape
+            and self.interpolation == other.interpolation
+            and np.array_equal(self.control_points, other.control_points)
         )
 
     def subdivided(self, cells: Iterable[int], interpolation: str = "bspline") -> LatticeCage:

@@ -58,7 +58,7 @@ class PageEdits:
 
 def for_page(edit: Edit) -> Edit:
     """The edit itself, or the same with a lattice in its shell that a page can have."""
-    if not isinstance(edit, Continuous) or (edit.lattice or FINEST_LATTICE + 1) <= FINEST_LATTICE:
+    if not isinstance(edit, Continuous) or (edit.kernel_lattice or FINEST_LATTICE + 1) <= FINEST_LATTICE:
         return edit
     return edit.replace(lattice=LATTICE if edit.lattice is None else FINEST_LATTICE)
 

@@ -11,9 +11,25 @@ One method per file; `cagefield.edits.shells` builds a continuous edit's shell.
 
 from __future__ import annotations
 
+from cagefield.warps.cage_maps import flow_between, inner_map_between
 from cagefield.warps.falloff import FALLOFFS, Falloff
 from cagefield.warps.flow_shell import FlowShell
-from cagefield.warps.interfaces import Mapped, Shell, Warp
+from cagefield.warps.free_form import FreeFormFlow, Velocity
+from cagefield.warps.interfaces import InnerMap, Mapped, NoInnerMap, Shell, Warp
 from cagefield.warps.trilinear_shell import TrilinearShell
 
-__all__ = ["FALLOFFS", "Falloff", "FlowShell", "Mapped", "Shell", "TrilinearShell", "Warp"]
+__all__ = [
+    "FALLOFFS",
+    "Falloff",
+    "FlowShell",
+    "FreeFormFlow",
+    "InnerMap",
+    "Mapped",
+    "NoInnerMap",
+    "Shell",
+    "TrilinearShell",
+    "Velocity",
+    "Warp",
+    "flow_between",
+    "inner_map_between",
+]

@@ -78,8 +78,9 @@ def _pack_discrete(row: NDArray[np.float32], warp: DiscreteWarp) -> None:
 
 
 def _pack_continuous(row: NDArray[np.float32], warp: ContinuousWarp, lattice: int | None) -> None:
-    row[FIRST], row[LAST], row[CONTINUOUS] = 0, 2, 1
-    _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
+    row[FIRST], row[LAST], row[CONTINUOUS] = int(warp.hexahedra is None), 2, 1
+    if warp.hexahedra is not None:
+        _record(row, 0, warp.hexahedra.deformed.corners, warp.hexahedra.canonical.corners)
     _record(row, 1, warp.outer.corners)
     if isinstance(warp.shell, TrilinearShell):
         row[LAST] = 8
@@ -94,7 +95,7 @@ def _pack_continuous(row: NDArray[np.float32], warp: ContinuousWarp, lattice: in
         row[RESOLUTION] = lattice
         row[NODE_BOX : NODE_BOX + 3] = -EDGE * lattice
         row[NODE_BOX + 3 : NODE_BOX + 6] = lattice - 1 + EDGE * lattice
-        row[SIMPLE] = row[RECORDS + AFFINE] == 1.0 and warp.outer.is_affine
+        row[SIMPLE] = row[FIRST] == 0 and row[RECORDS + AFFINE] == 1.0 and warp.outer.is_affine
     elif isinstance(warp.shell, FlowShell):
         row[RESOLUTION] = FLOW
 

@@ -392,7 +392,7 @@ class Session:
 
     def _push(self, name: str, document: Document) -> None:
         shown = (entry.edit for entry in document.entries if entry.edit.enabled)
-        too_large = problem_of_lattices(edit.lattice for edit in shown if isinstance(edit, Continuous))
+        too_large = problem_of_lattices(edit.kernel_lattice for edit in shown if isinstance(edit, Continuous))
         if too_large is not None:
             raise EditError(too_large)
         self.preview = None

@@ -17,7 +17,7 @@ def problem(edit: Edit) -> str | None:
     if not isinstance(edit, Continuous):
         return None
     outer = edit.outer
-    if not outer.contains([*edit.inner.corners, *edit.deformed.corners]).all():
+    if not outer.contains([*edit.inner.handles, *edit.deformed.handles]).all():
         return OUTSIDE_MESSAGE
     return FOLDED if isinstance(edit.shell, Trilinear) else CLOSE
 
