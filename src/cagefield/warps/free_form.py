@@ -43,8 +43,8 @@ class Velocity(Protocol):
     def at(self, points: Array, t: float) -> tuple[Array, Array]:
         """(v [N,3], dv/dx [N,3,3]) at points [N,3] and a time."""
 
-    def slope_bounds(self, times: Array) -> Array:
-        """Bounds L [T-1] of |dv/dx| at all points, and all times between each of times [T] and the next."""
+    def slope_bounds(self) -> Array:
+        """Bounds L [I] of |dv/dx| at all points, and all times between each of `TIMES` and the next."""
 
     def march(self, points: Array, knots: Array, jacobians: bool = True) -> tuple[Array, Array]:
         """(points [N,3], Jacobians [N,3,3]) at the last of the knots [K+1], of points at the first.
@@ -75,7 +75,7 @@ class FreeFormFlow:
 
     @cached_property
     def _slope_bounds(self) -> Array:
-        return self.velocity.slope_bounds(TIMES)
+        return self.velocity.slope_bounds()
 
     def with_strain(self, strain: float) -> FreeFormFlow:
         """Flow with other step sizes."""
