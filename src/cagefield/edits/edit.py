@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
@@ -36,9 +36,10 @@ from cagefield.edits.shells import (
     problem_of_unused_falloff,
 )
 from cagefield.errors import CageError, DeviceError, EditError
-from cagefield.geometry.cage import Axes, Cage, outside_by
+from cagefield.geometry.cage import Axes, Cage
 from cagefield.geometry.cage_checks import format_vector
 from cagefield.geometry.control_points import ControlPoints
+from cagefield.geometry.face_distance import outside_by
 from cagefield.geometry.reach_cage import ReachCage
 from cagefield.typing import Array, Float32
 from cagefield.warps import FlowShell, FreeFormFlow, Shell, Warp, inner_map_between, reach_between
@@ -213,6 +214,34 @@ class Edit(ABC):
     def move_face(self: AnyEdit, face: str, by: ArrayLike) -> AnyEdit:
         """The edit with a face of its inner cage, such as "+x", moved by a vector [3]."""
         return self.then(ops.MoveFace(face, ops.displacement(by, "move_face")))
+
+    def move_point(self: AnyEdit, point: int, by: ArrayLike) -> AnyEdit:
+        """The edit with one control point of its inner cage, numbered x fastest, moved by a vector [3]."""
+        return self.then(ops.MovePoint(point, ops.displacement(by, "move_point")))
+
+    def move_points(
+        self: AnyEdit,
+        points: Iterable[int],
+        by: ArrayLike,
+        *,
+        radius: float = 0.0,
+        falloff: str = "smooth",
+    ) -> AnyEdit:
+        """The edit with control points moved by a vector [3]; see `operations.MovePoints`."""
+        by = ops.displacement(by, "move_points")
+        return self.then(ops.MovePoints(tuple(points), by, radius, falloff))
+
+    def bend(self: AnyEdit, axis: str, angle: float, *, towards: str = "", fixed: str = "start") -> AnyEdit:
+        """The edit with its lattice bent along an axis by an angle in radians; see `operations.Bend`."""
+        return self.then(ops.Bend(axis, ops.degrees(angle), towards, fixed))
+
+    def twist(self: AnyEdit, axis: str, angle: float, *, fixed: str = "start") -> AnyEdit:
+        """The edit with its lattice twisted about an axis by an angle in radians; see `operations.Twist`."""
+        return self.then(ops.Twist(axis, ops.degrees(angle), fixed))
+
+    def taper(self: AnyEdit, axis: str, factor: float, *, fixed: str = "start") -> AnyEdit:
+        """The edit with its lattice scaled across an axis to a factor at its end; see `operations.Taper`."""
+        return self.then(ops.Taper(axis, float(factor), fixed))
 
     def then(self: AnyEdit, operation: Operation) -> AnyEdit:
         """The edit with one more operation."""
@@ -520,13 +549,18 @@ class Continuous(Edit):
             return (
                 f"outer cage must contain the inner cage: {deformed.handle_noun} {k} at"
                 f" {format_vector(handles[k])} is {distance:.3g} outside face {face}",
-                "; enlarge the outer cage or make the edit discrete",
+                "; enlarge the outer cage" + self._or_discrete,
             )
-        cure = "; reduce it, enlarge the outer cage, or make the edit discrete"
+        cure = f"; reduce it, or enlarge the outer cage{self._or_discrete}"
         return (
             f"the {self.shell.name} shell {self._shell(deformed).problem()}",
             "" if deformed is self.inner else cure,
         )
+
+    @property
+    def _or_discrete(self) -> str:
+        """The second cure, which only cages with 8 corners have."""
+        return " or make the edit discrete" if self.inner.is_hexahedron else ""
 
     def _shell(self, deformed: Cage) -> Shell:
         if deformed is self.deformed:

@@ -1,1 +1,2 @@
 from .cage import Cage as Cage
+from .cage import LatticeCage as LatticeCage

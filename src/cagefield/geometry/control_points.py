@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from cagefield.errors import CageError
 from cagefield.geometry import hexahedron
 from cagefield.geometry.cage import Axes, Cage
-from cagefield.geometry.cage_checks import format_vector, read_only, vector
+from cagefield.geometry.cage_checks import format_vector, read_only
 from cagefield.typing import Array, Mask
 
 FALLOFF_CURVES: tuple[str, ...] = ("smooth", "sphere", "root", "sharp", "linear")
@@ -142,42 +142,26 @@ class ControlPoints(Cage):
             mask[near] |= ((y - point) ** 2).sum(axis=1) <= self.radius**2
         return mask
 
-    def translate(self, by: ArrayLike) -> ControlPoints:
-        """All points moved by a vector [3]; the pivot travels with them."""
-        v = vector(by, "translate")
-        return self._with(self.points + v, self.pivot + v, self.linear)
-
-    def move_point(self, point: int, by: ArrayLike) -> ControlPoints:
-        """Points with one of them, 0 to n - 1, moved by a vector [3]; the pivot stays."""
-        return self.move_points((point,), by)
-
-    def move_points(self, points: Iterable[int], by: ArrayLike) -> ControlPoints:
-        """Points with some of them, each named once, moved by one vector [3]; the pivot stays."""
-        chosen = [self._number(point) for point in points]
-        if not chosen or len(set(chosen)) < len(chosen):
-            raise CageError(f"points must name one or more points, each once, got {chosen}")
-        moved = self.points.copy()
-        moved[chosen] += vector(by, "move_points")
-        return self._with(moved, self.pivot, self.linear)
+    def subdivided(self, cells: Iterable[int], interpolation: str = "bspline") -> NoReturn:
+        """Raises `CageError`: points have no cells."""
+        raise CageError("control points have no cells; subdivide a box, or add points")
 
     def _linear(self, M: Array, axes: Axes, own: bool = False) -> ControlPoints:
         if axes not in ("world", "cage"):
             raise CageError(f'axes must be "world" or "cage", got "{axes}"')
         if own and axes == "cage":
             M = self.axes @ M @ np.linalg.inv(self.axes)
-        return self._with(self.pivot + (self.points - self.pivot) @ M.T, self.pivot, M @ self.linear)
+        moved = self.pivot + (self.points - self.pivot) @ M.T
+        return self._moved(moved, self.pivot, rigid=True, linear=M @ self.linear)
 
     def _move(self, corners: tuple[int, ...], by: Array) -> NoReturn:
         raise CageError("control points have no corners, edges or faces; use move_point")
 
-    def _with(self, points: Array, pivot: Array, linear: Array) -> ControlPoints:
-        return ControlPoints(points, self.radius, self.falloff, pivot=pivot, linear=linear)
-
-    def _number(self, point: int) -> int:
-        count = len(self.points)
-        if isinstance(point, bool) or not isinstance(point, (int, np.integer)) or not 0 <= point < count:
-            raise CageError(f"point {point!r} is not a control point: they are 0 to {count - 1}")
-        return int(point)
+    def _moved(
+        self, points: Array, pivot: Array, *, rigid: bool = False, linear: Array | None = None
+    ) -> ControlPoints:
+        A = self.linear if linear is None else linear
+        return ControlPoints(points, self.radius, self.falloff, pivot=pivot, linear=A)
 
     def _box(self) -> Array:
         y = self.local_points

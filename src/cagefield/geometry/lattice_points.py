@@ -1,0 +1,109 @@
+"""Control points of a lattice cage: its spline, and operations that only a lattice has."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import cached_property
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cagefield.errors import CageError
+from cagefield.geometry import bspline_lattice, hexahedron, lattice_determinant, point_deformers
+from cagefield.typing import Array, Mask
+
+Lattice = TypeVar("Lattice")
+
+
+class LatticePoints(ABC, Generic[Lattice]):
+    """Lattice of control points [n,3], shape (nx, ny, nz), x fastest, and its interpolation."""
+
+    control_points: Array
+    shape: tuple[int, int, int]
+    interpolation: str
+    pivot: Array
+
+    @abstractmethod
+    def _moved(self, points: Array, pivot: Array, *, rigid: bool = False) -> Lattice:
+        """The lattice with its points elsewhere; `rigid` where one affine map takes all of them there."""
+
+    @property
+    def points(self) -> Array:
+        """The control points [n,3], x fastest."""
+        return self.control_points
+
+    @property
+    def handles(self) -> Array:
+        """The control points [n,3]."""
+        return self.control_points
+
+    @cached_property
+    def affine(self) -> tuple[Array, Array]:
+        """(A [3,3], b [3]) with x(u) = b + A u for the control points, in the least-squares sense."""
+        return lattice_determinant.fit(self.control_points, self.shape)
+
+    @cached_property
+    def is_affine(self) -> bool:
+        """True when the lattice is an even grid in a parallelepiped, to 1e-12 of its extent."""
+        A, b = self.affine
+        even = b + bspline_lattice.grid(self.shape) @ A.T
+        return bool(np.abs(even - self.control_points).max() <= 1e-12 * np.abs(A).max())
+
+    def coordinates(self, points: ArrayLike) -> tuple[Array, Mask]:
+        """(u [N,3], inside [N]) of points [N,3]: u in [0,1]^3 where inside, else unspecified."""
+        p = np.asarray(points, dtype=np.float64)
+        u, mask = np.full(p.shape, np.nan), np.zeros(len(p), dtype=bool)
+        low, high = self.aabb
+        slack = 1e-9 * (high - low)
+        near = np.flatnonzero(hexahedron.all_three((p >= low - slack) & (p <= high + slack)))
+        u[near], mask[near] = bspline_lattice.inverse(
+            self.control_points, self.shape, self.interpolation, p[near]
+        )
+        return u, mask
+
+    def evaluate(self, u: Array) -> tuple[Array, Array]:
+        """(x(u) [N,3], dx/du [N,3,3]) at u [N,3]."""
+        return bspline_lattice.evaluate(self.control_points, self.shape, self.interpolation, u)
+
+    @property
+    def _turn(self) -> Array:
+        """The rotation [3,3] nearest to the lattice's own axes."""
+        A = self.affine[0]
+        U, _, Vt = np.linalg.svd(A / np.linalg.norm(A, axis=0))
+        return np.asarray(U @ Vt)
+
+    def bend(self, axis: str, angle: float, *, towards: str = "", fixed: str = "start") -> Lattice:
+        """The lattice bent: its middle line along an axis of its own becomes an arc of `angle` radians.
+
+        `axis` and `towards` (the next axis in the order x, y, z, x if left out) are "x", "y" or "z";
+        `fixed`, "start", "middle" or "end", is where along the axis nothing moves. Raises `CageError` for a
+        cage without a lattice, unknown names, and a bend that turns the cage inside out.
+        """
+        along = point_deformers.axis_number(axis, "axis")
+        across = point_deformers.axis_number(towards, "towards") if towards else (along + 1) % 3
+        if across == along:
+            raise CageError(f"a bend along {axis} goes towards another axis than {axis}")
+        points = self.control_points
+        turn = _finite(angle, "bend angle")
+        return self._moved(point_deformers.bend(points, self._turn, along, across, turn, fixed), self.pivot)
+
+    def twist(self, axis: str, angle: float, *, fixed: str = "start") -> Lattice:
+        """The lattice twisted about an axis of its own by `angle` radians from end to end; see `bend`."""
+        along, turn = point_deformers.axis_number(axis, "axis"), _finite(angle, "twist angle")
+        points = point_deformers.twist(self.control_points, self._turn, along, turn, fixed)
+        return self._moved(points, self.pivot)
+
+    def taper(self, axis: str, factor: float, *, fixed: str = "start") -> Lattice:
+        """The lattice scaled across an axis of its own, evenly to a factor > 0 at its end; see `bend`."""
+        along, by = point_deformers.axis_number(axis, "axis"), _finite(factor, "taper factor")
+        if by <= 0.0:
+            raise CageError(f"taper factor must be positive, got {by:g}")
+        points = point_deformers.taper(self.control_points, self._turn, along, by, fixed)
+        return self._moved(points, self.pivot)
+
+
+def _finite(value: float, name: str) -> float:
+    if not np.isfinite(value):
+        raise CageError(f"{name} must be finite, got {value!r}")
+    return float(value)
