@@ -14,10 +14,8 @@ from cagefield.errors import CageError
 from cagefield.geometry import hexahedron
 from cagefield.geometry.cage import Axes, Cage
 from cagefield.geometry.cage_checks import format_vector, read_only
+from cagefield.geometry.point_deformers import FALLOFFS
 from cagefield.typing import Array, Mask
-
-FALLOFF_CURVES: tuple[str, ...] = ("smooth", "sphere", "root", "sharp", "linear")
-"""Names of the curves by which the motion fades with the distance, see `warps.falloff_curves`."""
 
 MAX_POINTS = 256
 """Control points of an edit: a map evaluates all of them at each of its points."""
@@ -33,7 +31,7 @@ class ControlPoints(Cage):
     Parameters
     - points: [n,3] world units, n from 1 to `MAX_POINTS`.
     - radius: reach of each point, world units, > 0.
-    - falloff: one of `FALLOFF_CURVES`.
+    - falloff: one of `FALLOFFS`.
     - pivot: [3], about which `rotate`, `scale` and `shear` turn; the mean of the points if left out.
     - linear: [3,3] with a positive determinant, the linear map that these operations have made of the space
       around the points: distances are measured before it. The identity for new points.
@@ -69,8 +67,8 @@ class ControlPoints(Cage):
     ) -> None:
         p = _points(points)
         r = _radius(radius)
-        if falloff not in FALLOFF_CURVES:
-            raise CageError(f'falloff must be one of {", ".join(FALLOFF_CURVES)}, got "{falloff!s:.40}"')
+        if falloff not in FALLOFFS:
+            raise CageError(f'falloff must be one of {", ".join(FALLOFFS)}, got "{falloff!s:.40}"')
         at = p.mean(axis=0) if pivot is None else pivot
         A = read_only(np.eye(3) if linear is None else linear, (3, 3), "linear map of control points")
         if not np.linalg.det(A) > 0.0:

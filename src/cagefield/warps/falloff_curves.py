@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.geometry.control_points import FALLOFF_CURVES
+from cagefield.geometry.point_deformers import FALLOFFS
 from cagefield.typing import Array
 
 ROOT_END: dict[str, float] = {"sphere": 0.25, "root": 0.0625}
@@ -29,8 +29,8 @@ STEEPEST: dict[str, float] = {"smooth": 1.5, "sphere": 6.0, "root": 6.0, "sharp"
 
 
 def curve_number(name: str) -> int:
-    """Number of a curve in kernels: its place in `FALLOFF_CURVES`."""
-    return FALLOFF_CURVES.index(name)
+    """Number of a curve in kernels: its place in `FALLOFFS`."""
+    return FALLOFFS.index(name)
 
 
 def curve(name: str, s: Array) -> tuple[Array, Array]:
