@@ -179,6 +179,7 @@ class ControlPointVelocity:
 
         Without `jacobians` the second array is [0,3,3].
         """
+        from cagefield.warps.kernels.control_point_lanes import LANES, march_lanes
         from cagefield.warps.kernels.control_points import march
 
         x = np.array(points, dtype=np.float64, order="C")
@@ -199,7 +200,12 @@ class ControlPointVelocity:
             ],
             axis=1,
         )
-        march(x, J, self._header, moments, np.diff(knots), jacobians)
+        if jacobians:
+            march(x, J, self._header, moments, np.diff(knots))
+        else:
+            blocks = -(-len(x) // LANES)
+            stride = next(n for n in range(int(0.618 * blocks) + 1, blocks + 2) if np.gcd(n, blocks) == 1)
+            march_lanes(x, self._header, moments, np.diff(knots), stride)
         return x, J
 
 
