@@ -38,9 +38,11 @@ from cagefield.edits.shells import (
 from cagefield.errors import CageError, DeviceError, EditError
 from cagefield.geometry.cage import Axes, Cage
 from cagefield.geometry.cage_checks import format_vector
+from cagefield.geometry.control_points import ControlPoints
 from cagefield.geometry.face_distance import outside_by
+from cagefield.geometry.reach_cage import ReachCage
 from cagefield.typing import Array, Float32
-from cagefield.warps import FlowShell, FreeFormFlow, Shell, Warp, inner_map_between
+from cagefield.warps import FlowShell, FreeFormFlow, Shell, Warp, inner_map_between, reach_between
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.hexahedron_map import HexahedronMap
@@ -130,6 +132,24 @@ class Edit(ABC):
     ) -> Continuous:
         """Edit whose surroundings give way between an inner and an outer cage; see `Continuous`."""
         return Continuous(inner, outer, shell=shell, lattice=lattice, name=name, **options)
+
+    @staticmethod
+    def points(
+        points: ArrayLike,
+        *,
+        radius: float,
+        falloff: str = "smooth",
+        outer: Cage | None = None,
+        name: str = "",
+        **options: Any,
+    ) -> Continuous:
+        """Edit of control points [n,3], with which everything within the radius follows, less and less.
+
+        `falloff` is one of smooth, sphere, root, sharp, linear; see `ControlPoints`. Without an outer cage
+        nothing else confines it. `options` are those of `continuous`.
+        """
+        cage = ControlPoints(points, radius, falloff)
+        return Continuous(cage, outer, name=name, **options)  # type: ignore[arg-type]
 
     @staticmethod
     def move(cage: Cage, *, name: str = "", **options: Any) -> Move:
@@ -329,7 +349,8 @@ class Continuous(Edit):
     """Edit whose shell, between the inner and the outer cage, is interpolated: the field stays connected.
 
     Parameters, besides those of `Edit`
-    - outer: the outer cage V^o, which confines the edit.
+    - outer: the outer cage V^o, which confines the edit. None for control points takes the box around all
+      that they reach on their way, a `ReachCage`.
     - shell: kind of the map between the cages, `Flow` (cannot fold) or `Trilinear` (the paper's).
     - lattice: None evaluates the shell exactly at every sample; an integer R interpolates it from R^3 nodes
       (64, 128 or 256 in the paper). The inner region is exact either way.
@@ -344,16 +365,24 @@ class Continuous(Edit):
     allow_folding: bool = False
 
     def __post_init__(self) -> None:
-        if not isinstance(self.outer, Cage):
-            self._refuse(
-                "a continuous edit needs an outer cage; give one (inner.grown(margin), say) or make the"
-                " edit discrete"
-            )
         if not isinstance(self.shell, ShellKind):
             self._refuse(f"shell must be Flow(...) or Trilinear(), got {self.shell!r:.60}")
         self._refuse(self.shell.problem_of_inner(self.inner))
         self._refuse(problem_of_lattice(self.lattice))
         super().__post_init__()
+        if self.outer is None or isinstance(self.outer, ReachCage):
+            object.__setattr__(self, "outer", self._reach)
+        if not isinstance(self.outer, Cage):
+            self._refuse(
+                "a continuous edit needs an outer cage; give one (inner.grown(margin), say) or make the"
+                " edit discrete"
+            )
+
+    @property
+    def _reach(self) -> ReachCage | None:
+        """The outer cage where none is given."""
+        reach = reach_between(self.inner, self.deformed)
+        return None if reach is None else ReachCage.around(reach)
 
     @property
     def shell_settings(self) -> ShellSettings:
@@ -520,13 +549,18 @@ class Continuous(Edit):
             return (
                 f"outer cage must contain the inner cage: {deformed.handle_noun} {k} at"
                 f" {format_vector(handles[k])} is {distance:.3g} outside face {face}",
-                "; enlarge the outer cage or make the edit discrete",
+                "; enlarge the outer cage" + self._or_discrete,
             )
-        cure = "; reduce it, enlarge the outer cage, or make the edit discrete"
+        cure = f"; reduce it, or enlarge the outer cage{self._or_discrete}"
         return (
             f"the {self.shell.name} shell {self._shell(deformed).problem()}",
             "" if deformed is self.inner else cure,
         )
+
+    @property
+    def _or_discrete(self) -> str:
+        """The second cure, which only cages with 8 corners have."""
+        return " or make the edit discrete" if self.inner.is_hexahedron else ""
 
     def _shell(self, deformed: Cage) -> Shell:
         if deformed is self.deformed:

@@ -63,6 +63,14 @@ class Flow(ShellKind):
     def build(self, inner: Cage, deformed: Cage, outer: Cage) -> Shell:
         return flow_between(inner, deformed, outer, Falloff(self.falloff, self.width))
 
+    def problem_of_inner(self, inner: Cage) -> str | None:
+        if not inner.has_own_falloff or self == SMOOTH_FLOW:
+            return None
+        return (
+            f"{inner.plural_noun} have a falloff and a radius of their own; leave out falloff and width of"
+            " the shell"
+        )
+
 
 @dataclass(frozen=True)
 class Trilinear(ShellKind):

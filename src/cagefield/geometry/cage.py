@@ -64,6 +64,9 @@ class Cage:
     is_hexahedron: ClassVar[bool] = True
     """False for cages of other shapes, whose `corners` are those of a box around them."""
 
+    has_own_falloff: ClassVar[bool] = False
+    """True for cages that say how the motion fades around them, in place of the shell."""
+
     handle_noun: ClassVar[str] = "inner corner"
     """One of `handles`, in messages."""
 

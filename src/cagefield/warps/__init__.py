@@ -11,7 +11,8 @@ One method per file; `cagefield.edits.shells` builds a continuous edit's shell.
 
 from __future__ import annotations
 
-from cagefield.warps.cage_maps import flow_between, inner_map_between
+from cagefield.warps.cage_maps import flow_between, inner_map_between, reach_between
+from cagefield.warps.control_point_velocity import ControlPointVelocity
 from cagefield.warps.falloff import FALLOFFS, Falloff
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.free_form import FreeFormFlow, Velocity
@@ -20,6 +21,7 @@ from cagefield.warps.trilinear_shell import TrilinearShell
 
 __all__ = [
     "FALLOFFS",
+    "ControlPointVelocity",
     "Falloff",
     "FlowShell",
     "FreeFormFlow",
@@ -32,4 +34,5 @@ __all__ = [
     "Warp",
     "flow_between",
     "inner_map_between",
+    "reach_between",
 ]

@@ -34,7 +34,8 @@ LEAST_STEPS, MOST_STEPS = 4, 1024
 TIMES: Array = np.linspace(0.0, 1.0, 65)
 """Ends of the intervals in which the velocity's slope is bounded."""
 
-_CHUNK = 65_536
+_CHUNK = 262_144
+"""Nodes at a time: 64^3."""
 
 
 class Velocity(Protocol):
@@ -43,8 +44,8 @@ class Velocity(Protocol):
     def at(self, points: Array, t: float) -> tuple[Array, Array]:
         """(v [N,3], dv/dx [N,3,3]) at points [N,3] and a time."""
 
-    def slope_bounds(self, times: Array) -> Array:
-        """Bounds L [T-1] of |dv/dx| at all points, and all times between each of times [T] and the next."""
+    def slope_bounds(self) -> Array:
+        """Bounds L [I] of |dv/dx| at all points, and all times between each of `TIMES` and the next."""
 
     def march(self, points: Array, knots: Array, jacobians: bool = True) -> tuple[Array, Array]:
         """(points [N,3], Jacobians [N,3,3]) at the last of the knots [K+1], of points at the first.
@@ -75,7 +76,7 @@ class FreeFormFlow:
 
     @cached_property
     def _slope_bounds(self) -> Array:
-        return self.velocity.slope_bounds(TIMES)
+        return self.velocity.slope_bounds()
 
     def with_strain(self, strain: float) -> FreeFormFlow:
         """Flow with other step sizes."""
@@ -102,19 +103,23 @@ class FreeFormFlow:
         Those in the region of `inner` are its own.
         """
         origin, frame = self.outer.frame
-        g = np.linspace(0.0, 1.0, resolution)
-        displacement = np.empty((resolution**3, 3), dtype=np.float32)
+        along = np.linspace(0.0, 1.0, resolution)[:, None, None] * frame.T  # [R, axis, 3]
+        displacement = np.empty((resolution, resolution, resolution, 3), dtype=np.float32)
         slices = max(1, _CHUNK // resolution**2)
         for first in range(0, resolution, slices):
-            z, y, x = np.meshgrid(g[first : first + slices], g, g, indexing="ij")
-            nodes = origin + np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1) @ frame.T
-            moved = nodes.copy()
-            inside, canonical, _ = inner(nodes)
-            moved[inside] = canonical
-            moved[~inside], _ = self.velocity.march(nodes[~inside], self.knots[::-1], jacobians=False)
-            start = first * resolution**2
-            displacement[start : start + len(nodes)] = moved - nodes
-        return displacement
+            part = slice(first, first + slices)
+            plane = along[None, :, 1, None] + along[None, None, :, 0]
+            nodes = (origin + along[part, 2])[:, None, None] + plane
+            flat = nodes.reshape(-1, 3)
+            inside, canonical, _ = inner(flat)
+            if inside.any():
+                moved = np.empty_like(flat)
+                moved[inside] = canonical
+                moved[~inside], _ = self.velocity.march(flat[~inside], self.knots[::-1], jacobians=False)
+            else:
+                moved, _ = self.velocity.march(flat, self.knots[::-1], jacobians=False)
+            np.subtract(moved.reshape(nodes.shape), nodes, out=displacement[part], casting="same_kind")
+        return displacement.reshape(-1, 3)
 
     def least_ratio(self) -> float:
         """Least det of d(deformed)/d(canonical) at 4096 points of the outer cage: a sample, not a bound."""
