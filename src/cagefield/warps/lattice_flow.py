@@ -33,14 +33,14 @@ SLOPE = 0.75
 class LatticeFlow:
     """Flow of V^o onto itself, z -> Phi(z) in the outer cage's coordinates z in [-1,1]^3.
 
-    The velocity at x: each sample j of the lattice tells, by its own affine map, coordinates u_j(x). The means
-    over the samples, with weights (|x - x_j|^2 + blur)^-3, of the distance between u_j(x) and the lattice, d_i,
-    and of the lattice's velocity at clamp u_j(x), make w V, with w the weight of `Falloff` at d_i / d_o. Near
-    the lattice, the distance and V are its own. The velocity is interpolated (trilinear in z) from a grid of
-    nodes, one slice for each step.
+    The velocity at x: each sample j of the lattice tells, by its own affine map, coordinates u_j(x). The
+    means over the samples, with weights (|x - x_j|^2 + blur)^-3, of the distance between u_j(x) and the
+    lattice, d_i, and of the lattice's velocity at clamp u_j(x), make w V, with w the weight of `Falloff` at
+    d_i / d_o. Near the lattice, the distance and V are its own. The velocity is interpolated (trilinear in z)
+    from a grid of nodes, one slice for each step.
 
-    A step is the implicit midpoint rule, z' = m + h/2 v(m), z = m - h/2 v(m): backwards it is its own inverse,
-    and it is one to one where h/2 |dv/dz| < 1, which the grid's differences bound.
+    A step is the implicit midpoint rule, z' = m + h/2 v(m), z = m - h/2 v(m): backwards it is its own
+    inverse, and it is one to one where h/2 |dv/dz| < 1, which the grid's differences bound.
 
     Parameters: the pieces of the way, the outer cage, the falloff, the grid's cells along each axis.
     """

@@ -10,11 +10,13 @@ import numpy as np
 from cagefield.geometry import bspline_lattice, hexahedron
 from cagefield.geometry.cage import Cage, LatticeCage
 from cagefield.typing import Array, Float32, Mask
+from cagefield.warps.cage_maps import flow_between, inner_map_between
 from cagefield.warps.falloff import Falloff
+from cagefield.warps.interfaces import InnerMap, NoInnerMap
 from cagefield.warps.lattice_flow import LatticeFlow, outer_distance, outer_distance_gradient
 from cagefield.warps.lattice_way import Piece, pieces_between
 
-GRIDS: tuple[int, ...] = (24, 40, 64)
+GRIDS: tuple[int, ...] = (24, 36, 48)
 """Cells of the velocity's grid along each axis of the outer cage, tried one after the other."""
 
 MOST_CORRECTION = 0.9
@@ -35,9 +37,9 @@ class LatticeShell:
 
         to_deformed(X) = Phi(R(X)),    R(X) = X + rho(X) r(clamp X),    r(s) = Phi^-1(L(s)) - s,
 
-    with clamp X the nearest point (in u) of the canonical cage, rho = g^2 (3 - 2 g) with g = d_o / (d_i + d_o),
-    1 on the cage and 0 on the outer one, and Phi a flow that follows the lattice on its way, see `LatticeFlow`.
-    So the map equals L on the lattice's faces whatever Phi is; the better Phi follows, the less is left to r.
+    with clamp X the nearest point (in u) of the canonical cage, rho = g^2 (3 - 2 g), g = d_o / (d_i + d_o), 1
+    on the cage and 0 on the outer one, and Phi a flow that follows the lattice on its way (`LatticeFlow`). So
+    the map equals L on the lattice's faces whatever Phi is; the better Phi follows, the less is left to r.
 
     One to one: L and its way by Bernstein coefficients, Phi step by step by a bound of its slope, R where the
     slope of rho r is below 1, of which the largest of 9 (places a face sample) is taken.
@@ -99,7 +101,7 @@ class LatticeShell:
         return moved, J
 
     def sample(self, resolution: int) -> Float32:
-        """Displacements to canonical space [R^3,3], x fastest, of the nodes of the outer cage; see `Lattice`."""
+        """Displacements to canonical space [R^3,3], x fastest, of the nodes of a `Lattice`."""
         if not self.outer.is_affine:
             return self._sampled_exactly(resolution)
         from cagefield.warps.kernels.lattice_nodes import sample_nodes
@@ -145,8 +147,8 @@ class LatticeShell:
         """Why the map is not one to one, in words that continue "the flow shell ...", or None."""
         if not self.inner.is_affine:
             return (
-                "cannot surround the lattice: before any operation its control points must lie evenly in a box"
-                " (or a parallelepiped); move them by operations instead"
+                "cannot surround the lattice: before any operation its control points must lie evenly in a"
+                " box (or a parallelepiped); move them by operations instead"
             )
         for lattice, when in ((self.inner, " before any operation"), (self.deformed, "")):
             u, found = hexahedron.inverse(self.outer.corners, lattice.control_points)
@@ -282,7 +284,7 @@ class Surroundings:
 
     @cached_property
     def face_table(self) -> Array:
-        """r [6,T,T,3] at even nodes of the canonical cage's faces -x, +x, -y, ..., +z; see `lattice_nodes`."""
+        """r [6,T,T,3] at even nodes of the canonical cage's faces -x, +x, -y, +y, -z, +z."""
         n = int(np.clip(8 * (max(self.deformed.shape) - 1), 24, 48)) + 1
         b, c = (g.ravel() for g in np.meshgrid(*2 * (np.linspace(0.0, 1.0, n),), indexing="ij"))
         u = np.empty((6, n * n, 3))
@@ -319,3 +321,13 @@ class Surroundings:
             X = b + (u + outwards * (share * room / lengths)[:, None]) @ A.T
             most = max(most, float(np.linalg.norm(self._faded(X, r, dr)[1], ord=2, axis=(1, 2)).max()))
         return most
+
+
+@flow_between.register
+def _(inner: LatticeCage, deformed: LatticeCage, outer: Cage, falloff: Falloff) -> LatticeShell:
+    return LatticeShell(inner, deformed, outer, falloff)
+
+
+@inner_map_between.register
+def _(inner: LatticeCage, deformed: Cage) -> InnerMap:
+    return NoInnerMap()  # the shell holds the map inside, too

@@ -4,10 +4,10 @@ Notation: in a piece, s in [0,1] is the time; the lattice goes from control poin
 
     x(u, s) = c(s) + F(s) y(u, s),    y(u, s) = y_A(u) + s (y_B(u) - y_A(u)),
 
-with M the affine map that fits B over A best, M = R S its polar decomposition, F(s) = R^s S^s, c(s) the straight
-way of the points' mean, y_A = A - mean A, y_B = M^-1 (B - mean B): the lattice turns and grows as a whole, and
-the rest of its motion is straight in the frame that goes along. det dx/du > 0 all the way is proven by
-`geometry.lattice_determinant`, in u and s together.
+with M the affine map that fits B over A best, M = R S its polar decomposition, F(s) = R^s S^s, c(s) the
+straight way of the points' mean, y_A = A - mean A, y_B = M^-1 (B - mean B): the lattice turns and grows as a
+whole, and the rest of its motion is straight in the frame that goes along. det dx/du > 0 all the way is proven
+by `geometry.lattice_determinant`, in u and s together.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cagefield.geometry import bspline_lattice, lattice_determinant
-from cagefield.geometry.cage import LatticeCage
+from cagefield.geometry.cage import MOST_STATES, LatticeCage
 from cagefield.typing import Array
 
 MOST_TURN = 1.6
@@ -28,7 +28,7 @@ MOST_TURN = 1.6
 
 @dataclass(frozen=True)
 class Piece:
-    """One piece of a way: control points [n,3] at its start and end, shape and interpolation of the lattice."""
+    """One piece of a way: control points [n,3] at its start and end; the lattice's shape, interpolation."""
 
     start: Array
     end: Array
@@ -89,12 +89,12 @@ class Piece:
 def pieces_between(inner: LatticeCage, deformed: LatticeCage) -> tuple[Piece, ...] | None:
     """Pieces of a way that is one to one from an inner cage to the deformed one; None where none is found.
 
-    The direct way, or one along the states that the operations have left on `deformed.way`, where a part of the
-    lattice turns by more than `MOST_TURN` against the whole: a straight way would squeeze it.
+    The direct way, or one along the states that the operations have left on `deformed.way`, where a part of
+    the lattice turns by more than `MOST_TURN` against the whole: a straight way would squeeze it.
     """
     if inner.shape != deformed.shape or inner.interpolation != deformed.interpolation:
         return None
-    states = [inner.control_points, *deformed.way, deformed.control_points]
+    states = _states(inner, deformed)
     pieces: list[Piece] = []
     at = 0
     while at < len(states) - 1:
@@ -111,3 +111,16 @@ def pieces_between(inner: LatticeCage, deformed: LatticeCage) -> tuple[Piece, ..
         at = found[0]
         pieces.append(found[1])
     return tuple(pieces)
+
+
+def _states(inner: LatticeCage, deformed: LatticeCage) -> list[Array]:
+    """Control points of the inner cage, of the states after it, and of the deformed cage."""
+    way = list(deformed.way)
+    for n in range(len(way) - 1, -1, -1):
+        if np.array_equal(way[n], inner.control_points):
+            way = way[n + 1 :]
+            break
+    else:
+        if len(way) < MOST_STATES:  # not made from this inner cage
+            way = []
+    return [inner.control_points, *way, deformed.control_points]

@@ -116,7 +116,7 @@ def flow_points(grids, steps, backwards, enough, z, J):
 
 @njit(**FAST)
 def lattice_point(P, linear, u, x, J, weights):
-    """Writes x(u) [3] and dx/du [3,3] of padded control points P [nz+2,ny+2,nx+2,3], see `bspline_lattice`."""
+    """Writes x(u) [3] and dx/du [3,3] of padded control points P, see `bspline_lattice.padded`."""
     for a in range(3):
         cells = P.shape[2 - a] - 3
         s = u[a] * cells
@@ -262,7 +262,7 @@ def _fill_batch(places, reach, dz, frame, samples, P, linear, blur, margin, fall
         m0 = np.float32(0.0)
         m1 = np.float32(0.0)
         m2 = np.float32(0.0)
-        one, half, zero = np.float32(1.0), np.float32(0.5), np.float32(0.0)
+        one, zero = np.float32(1.0), np.float32(0.0)
         for j in range(count):
             a = y0 - samples[0, j]
             b = y1 - samples[1, j]

@@ -37,7 +37,7 @@ def _velocity(grid, x, y, z):
 
 @njit(**FAST)
 def _flow_back(grids, steps, z):
-    """Takes z [3] float32 back through all slices, in place: two iterations a step, from the last velocity."""
+    """Takes z [3] float32 back through all slices, in place, by iterations from the last velocity."""
     x, y, w = z[0], z[1], z[2]
     v0, v1, v2 = _velocity(grids[-1], x, y, w)
     for n in range(len(grids)):
