@@ -213,10 +213,9 @@ def test_kernels_show_control_points_without_a_lattice_by_one_of_64() -> None:
     exact, fine = edit.without_lattice(), edit.replace(lattice=64)
     assert exact.kernel_lattice == 64 and exact.lattice is None
     p, d = samples(2000)
-    for one, other in zip(
-        *(DeviceStack.from_stack(EditStack([e])).to_canonical(p, d) for e in (exact, fine))
-    ):
-        np.testing.assert_array_equal(one, other)
+    one, other = (DeviceStack.from_stack(EditStack([edit])).to_canonical(p, d) for edit in (exact, fine))
+    for values, expected in zip(one, other, strict=True):
+        np.testing.assert_array_equal(values, expected)
     # It is off by what is measured, and the reference of the edit without one by nothing.
     worst, mean = exact.lattice_error()
     points = DeviceStack.from_stack(EditStack([exact])).to_canonical(p, d)[0]
