@@ -540,6 +540,7 @@ class Continuous(Edit):
     def _fault(self, deformed: Cage) -> tuple[str, str]:
         """(fault, cure) with the inner cage at a `deformed` that is not safe."""
         handles = deformed.handles
+        has_corners = self.inner.is_hexahedron
         outside = np.flatnonzero(~self.outer.contains(handles))
         if len(outside):
             face, distance, k = max(
@@ -552,7 +553,7 @@ class Continuous(Edit):
                 "; enlarge the outer cage"
                 + (" or make the edit discrete" if self.inner.is_hexahedron else ""),
             )
-        if self.inner.is_hexahedron:
+        if has_corners:
             cure = "; reduce it, enlarge the outer cage, or make the edit discrete"
         else:
             cure = "; reduce it" if self.outer.follows_edit else "; reduce it, or enlarge the outer cage"
