@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,15 +11,34 @@ from scipy.spatial.transform import Rotation
 from cagefield.edits.file_nodes import Node
 from cagefield.edits.operations import euler_degrees
 from cagefield.errors import CagefieldError
-from cagefield.geometry.cage import Cage
+from cagefield.geometry.bspline_lattice import INTERPOLATIONS
+from cagefield.geometry.cage import Cage, LatticeCage
+from cagefield.geometry.cage_checks import MOST_POINTS
 from cagefield.geometry.control_points import ControlPoints
 from cagefield.geometry.point_deformers import FALLOFFS
 from cagefield.typing import Array
 
 
 def parse_inner(node: Node) -> Cage:
-    """The inner cage of an edit: control points, or a cage with 8 corners."""
+    """The inner cage of an edit: control points, a lattice, or a cage with 8 corners."""
+    if "lattice" in node.names():
+        return _lattice(node)
     return _control_points(node) if "points" in node.names() else parse_cage(node)
+
+
+def _lattice(node: Node) -> LatticeCage:
+    box = parse_cage(replace(node, value={k: v for k, v in node.value.items() if k != "lattice"}))
+    lattice = node.value["lattice"]
+    keys = lattice.mapping(required=("points",), optional=("interpolation", "control_points"))
+    shape = [count.integer(2, MOST_POINTS) for count in keys["points"].items(3)]
+    interpolation = keys["interpolation"].choice(INTERPOLATIONS) if "interpolation" in keys else "bspline"
+    try:
+        if "control_points" not in keys:
+            return box.subdivided([count - 1 for count in shape], interpolation)
+        points = [point.vector() for point in keys["control_points"].items(int(np.prod(shape)))]
+        return LatticeCage(np.array(points), shape, interpolation, pivot=box.pivot)
+    except CagefieldError as error:
+        raise lattice.error(str(error)) from None
 
 
 def _control_points(node: Node) -> ControlPoints:
@@ -66,7 +86,17 @@ def parse_outer(node: Node, inner: Cage) -> Cage:
 
 def dump_inner(cage: Cage) -> dict[str, Any]:
     """The mapping that `parse_inner` reads."""
+    if isinstance(cage, LatticeCage):
+        return _from_lattice(cage)
     return _from_control_points(cage) if isinstance(cage, ControlPoints) else dump_cage(cage)
+
+
+def _from_lattice(cage: LatticeCage) -> dict[str, Any]:
+    box = Cage(cage.corners, pivot=cage.pivot)
+    lattice: dict[str, Any] = {"points": list(cage.shape), "interpolation": cage.interpolation}
+    if box.subdivided([count - 1 for count in cage.shape], cage.interpolation) != cage:
+        lattice["control_points"] = cage.control_points.tolist()
+    return dump_cage(box) | {"lattice": lattice}
 
 
 def _from_control_points(cage: ControlPoints) -> dict[str, Any]:

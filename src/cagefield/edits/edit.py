@@ -42,7 +42,15 @@ from cagefield.geometry.control_points import ControlPoints
 from cagefield.geometry.face_distance import outside_by
 from cagefield.geometry.reach_cage import ReachCage
 from cagefield.typing import Array, Float32
-from cagefield.warps import FlowShell, FreeFormFlow, Shell, Warp, inner_map_between, reach_between
+from cagefield.warps import (
+    FlowShell,
+    FreeFormFlow,
+    LatticeShell,
+    Shell,
+    Warp,
+    inner_map_between,
+    reach_between,
+)
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.hexahedron_map import HexahedronMap
@@ -420,7 +428,7 @@ class Continuous(Edit):
         exact = self.exact_warp
         if self.lattice is None:
             return exact
-        if isinstance(exact.shell, FlowShell | FreeFormFlow):
+        if isinstance(exact.shell, FlowShell | FreeFormFlow | LatticeShell):
             with suppress(DeviceError):
                 return replace(exact, lattice=self._kernel_lattice)
         lattice = Lattice.sample(lambda p: exact.to_canonical(p).points, exact.outer, self.lattice)

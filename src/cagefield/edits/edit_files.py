@@ -34,6 +34,14 @@
         operations:                           # no outer cage: the box around all that is reached
           - move_point: {point: 0, by: [0, 0.3, 0]}
           - move_points: {points: [0], by: [0, 0.1, 0]}
+      - name: bent arm
+        inner: {center: [0, 0, 1], size: [0.3, 0.3, 1], lattice: {points: [2, 2, 5], interpolation: bspline}}
+        outer: {margin: 0.5}                  # a lattice of control points, x fastest; or linear
+        operations:
+          - bend: {axis: z, degrees: 60, towards: x, fixed: start}    # or middle, end; along its own axes
+          - twist: {axis: z, degrees: 30}
+          - taper: {axis: z, factor: 0.8}
+          - move_points: {points: [16, 17], by: [0, 0.1, 0], radius: 0.4, falloff: smooth}
 
 Further keys of an edit: keep_source (discrete: copy instead of move), enabled, allow_folding. Lengths are
 world units, angles degrees. `parse_edits(dump_edits(stack))` is the stack, bit for bit.

@@ -7,7 +7,7 @@ from typing import Any
 from cagefield.edits import operations
 from cagefield.edits.file_nodes import Node
 from cagefield.edits.operations import Operation
-from cagefield.geometry.point_deformers import FALLOFFS
+from cagefield.geometry.point_deformers import AXES, FALLOFFS, FIXED
 
 MAX_POINTS = 512
 """Points of any inner cage: lattices have up to 8 along each axis."""
@@ -28,6 +28,9 @@ def parse_operation(node: Node) -> Operation:
         "move_corners",
         "move_point",
         "move_points",
+        "bend",
+        "twist",
+        "taper",
     )
     keys = node.mapping(optional=names)
     if len(keys) != 1:
@@ -68,8 +71,22 @@ def parse_operation(node: Node) -> Operation:
         radius = parts["radius"].number() if "radius" in parts else 0.0
         falloff = parts["falloff"].choice(FALLOFFS) if "falloff" in parts else "smooth"
         return operations.MovePoints(points, parts["by"].vector(), radius, falloff)
+    if name == "bend":
+        parts = value.mapping(required=("axis", "degrees"), optional=("towards", "fixed"))
+        towards = parts["towards"].choice(AXES) if "towards" in parts else ""
+        return operations.Bend(parts["axis"].choice(AXES), parts["degrees"].number(), towards, _fixed(parts))
+    if name == "twist":
+        parts = value.mapping(required=("axis", "degrees"), optional=("fixed",))
+        return operations.Twist(parts["axis"].choice(AXES), parts["degrees"].number(), _fixed(parts))
+    if name == "taper":
+        parts = value.mapping(required=("axis", "factor"), optional=("fixed",))
+        return operations.Taper(parts["axis"].choice(AXES), parts["factor"].number(), _fixed(parts))
     parts = value.mapping(required=("face", "by"))
     return operations.MoveFace(parts["face"].text(), parts["by"].vector())
+
+
+def _fixed(parts: dict[str, Node]) -> str:
+    return parts["fixed"].choice(FIXED) if "fixed" in parts else "start"
 
 
 def dump_operation(operation: Operation) -> dict[str, Any]:
@@ -97,7 +114,22 @@ def dump_operation(operation: Operation) -> dict[str, Any]:
         if operation.radius > 0.0:
             content |= {"radius": operation.radius, "falloff": operation.falloff}
         return {"move_points": content}
+    if isinstance(operation, operations.Bend):
+        content = {"axis": operation.axis, "degrees": operation.degrees}
+        if operation.towards:
+            content["towards"] = operation.towards
+        return {"bend": content | _with_fixed(operation.fixed)}
+    if isinstance(operation, operations.Twist):
+        content = {"axis": operation.axis, "degrees": operation.degrees}
+        return {"twist": content | _with_fixed(operation.fixed)}
+    if isinstance(operation, operations.Taper):
+        content = {"axis": operation.axis, "factor": operation.factor}
+        return {"taper": content | _with_fixed(operation.fixed)}
     return {"move_face": {"face": operation.face, "by": list(operation.by)}}
+
+
+def _with_fixed(fixed: str) -> dict[str, Any]:
+    return {} if fixed == "start" else {"fixed": fixed}
 
 
 def _with_axes(by: tuple[float, float, float], axes: str) -> Any:

@@ -36,6 +36,9 @@ from cagefield.typing import Array, Mask
 
 Axes: TypeAlias = Literal["world", "cage"]
 
+MOST_STATES = 64
+"""Earlier states that a lattice remembers."""
+
 
 @dataclass(frozen=True, eq=False)
 class Cage:
@@ -337,6 +340,8 @@ class LatticeCage(LatticePoints, Cage):
     of the points if left out. `corners` [8,3] are the outermost control points where they make a valid
     hexahedron, else the corners of `frame`: for gizmos and boxes, not for the map.
 
+    `way` holds the control points of earlier states, which operations leave: a map may follow them.
+
     Operations move all control points; moving corners, edges or faces moves them by trilinear weights.
 
     Raises `CageError` for a wrong number of points, and where the Jacobian determinant is not proven positive
@@ -355,6 +360,7 @@ class LatticeCage(LatticePoints, Cage):
         *,
         pivot: ArrayLike | None = None,
         proven: bool = False,
+        way: tuple[Array, ...] = (),
     ) -> None:
         counts = lattice_shape(shape)
         control = read_only(points, (int(np.prod(counts)), 3), "lattice points")
@@ -362,6 +368,7 @@ class LatticeCage(LatticePoints, Cage):
         object.__setattr__(self, "control_points", control)
         object.__setattr__(self, "shape", counts)
         object.__setattr__(self, "interpolation", interpolation)
+        object.__setattr__(self, "way", way)
         object.__setattr__(self, "pivot", read_only(place, (3,), "cage pivot"))
         check_lattice(control, counts, interpolation, proven=proven)
         object.__setattr__(self, "corners", self._hexahedron())
@@ -405,8 +412,11 @@ class LatticeCage(LatticePoints, Cage):
             raise CageError("a lattice is subdivided before its points are moved; subdivide the box instead")
         return super().subdivided(cells, interpolation)
 
-    def _moved(self, points: Array, pivot: Array, *, rigid: bool = False) -> Cage:
-        return LatticeCage(points, self.shape, self.interpolation, pivot=pivot, proven=rigid)
+    def _moved(
+        self, points: Array, pivot: Array, *, rigid: bool = False, way: tuple[Array, ...] = ()
+    ) -> Cage:
+        way = (*self.way, self.control_points, *way)[-MOST_STATES:]
+        return LatticeCage(points, self.shape, self.interpolation, pivot=pivot, proven=rigid, way=way)
 
     def _move(self, corners: tuple[int, ...], by: Array) -> Cage:
         u = bspline_lattice.grid(self.shape)

@@ -15,6 +15,9 @@ from cagefield.typing import Array, Mask
 
 Lattice = TypeVar("Lattice")
 
+STATE_ANGLE = 1.0
+"""Radians after which a bend or twist leaves a state on the lattice's way."""
+
 
 class LatticePoints(ABC, Generic[Lattice]):
     """Lattice of control points [n,3], shape (nx, ny, nz), x fastest, and its interpolation."""
@@ -22,11 +25,14 @@ class LatticePoints(ABC, Generic[Lattice]):
     control_points: Array
     shape: tuple[int, int, int]
     interpolation: str
+    way: tuple[Array, ...]
     pivot: Array
 
     @abstractmethod
-    def _moved(self, points: Array, pivot: Array, *, rigid: bool = False) -> Lattice:
-        """The lattice with its points elsewhere; `rigid` where one affine map takes all of them there."""
+    def _moved(
+        self, points: Array, pivot: Array, *, rigid: bool = False, way: tuple[Array, ...] = ()
+    ) -> Lattice:
+        """The lattice with its points elsewhere, by way of some states [n,3]; `rigid`: by one affine map."""
 
     @property
     def points(self) -> Array:
@@ -84,15 +90,16 @@ class LatticePoints(ABC, Generic[Lattice]):
         across = point_deformers.axis_number(towards, "towards") if towards else (along + 1) % 3
         if across == along:
             raise CageError(f"a bend along {axis} goes towards another axis than {axis}")
-        points = self.control_points
-        turn = _finite(angle, "bend angle")
-        return self._moved(point_deformers.bend(points, self._turn, along, across, turn, fixed), self.pivot)
+        turn, points, Q = _finite(angle, "bend angle"), self.control_points, self._turn
+        states = [point_deformers.bend(points, Q, along, across, t * turn, fixed) for t in _shares(turn)]
+        return self._moved(states[-1], self.pivot, way=tuple(states[:-1]))
 
     def twist(self, axis: str, angle: float, *, fixed: str = "start") -> Lattice:
         """The lattice twisted about an axis of its own by `angle` radians from end to end; see `bend`."""
         along, turn = point_deformers.axis_number(axis, "axis"), _finite(angle, "twist angle")
-        points = point_deformers.twist(self.control_points, self._turn, along, turn, fixed)
-        return self._moved(points, self.pivot)
+        points, Q = self.control_points, self._turn
+        states = [point_deformers.twist(points, Q, along, t * turn, fixed) for t in _shares(turn)]
+        return self._moved(states[-1], self.pivot, way=tuple(states[:-1]))
 
     def taper(self, axis: str, factor: float, *, fixed: str = "start") -> Lattice:
         """The lattice scaled across an axis of its own, evenly to a factor > 0 at its end; see `bend`."""
@@ -101,6 +108,12 @@ class LatticePoints(ABC, Generic[Lattice]):
             raise CageError(f"taper factor must be positive, got {by:g}")
         points = point_deformers.taper(self.control_points, self._turn, along, by, fixed)
         return self._moved(points, self.pivot)
+
+
+def _shares(angle: float) -> list[float]:
+    """Shares of an angle, up to the whole, that are no more than `STATE_ANGLE` apart; at most 64."""
+    count = int(np.clip(np.ceil(abs(angle) / STATE_ANGLE), 1, 64))
+    return [(n + 1) / count for n in range(count)]
 
 
 def _finite(value: float, name: str) -> float:

@@ -17,6 +17,7 @@ from cagefield.warps.falloff import FALLOFFS, Falloff
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.free_form import FreeFormFlow, Velocity
 from cagefield.warps.interfaces import InnerMap, Mapped, NoInnerMap, Shell, Warp
+from cagefield.warps.lattice_shell import LatticeShell
 from cagefield.warps.trilinear_shell import TrilinearShell
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "FlowShell",
     "FreeFormFlow",
     "InnerMap",
+    "LatticeShell",
     "Mapped",
     "NoInnerMap",
     "Shell",
