@@ -6,8 +6,8 @@ Notation: in a piece, s in [0,1] is the time; the lattice goes from control poin
 
 with M the affine map that fits B over A best, M = R S its polar decomposition, F(s) = R^s S^s, c(s) the
 straight way of the points' mean, y_A = A - mean A, y_B = M^-1 (B - mean B): the lattice turns and grows as a
-whole, and the rest of its motion is straight in the frame that goes along. det dx/du > 0 all the way is proven
-by `geometry.lattice_determinant`, in u and s together.
+whole, and the rest of its motion is straight in the frame that goes along. det dx/du > 0 all the way is
+proven by `geometry.lattice_determinant`, in u and s together.
 """
 
 from __future__ import annotations
