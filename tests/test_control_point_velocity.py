@@ -30,7 +30,8 @@ def test_curves_are_those_of_3d_editors_but_where_their_slope_has_no_bound(name:
     # The derivative, and that nothing is steeper than what steps are made for.
     middle = np.diff(w) / np.diff(s)
     between = curve(name, 0.5 * (s[1:] + s[:-1]))[1]
-    np.testing.assert_allclose(middle[1:], between[1:], atol=2e-4)
+    # The step squared times the third derivative, and at q = e half a jump of the second.
+    np.testing.assert_allclose(middle[1:], between[1:], atol=1e-3)
     assert slope.max() <= STEEPEST[name] * (1.0 + 1e-12) and slope.max() > 0.99 * STEEPEST[name]
     assert curve(name, np.array([-0.1, 1.1]))[0].tolist() == [0.0, 1.0]
 

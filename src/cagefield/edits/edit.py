@@ -548,6 +548,7 @@ class Continuous(Edit):
     def _fault(self, deformed: Cage) -> tuple[str, str]:
         """(fault, cure) with the inner cage at a `deformed` that is not safe."""
         handles = deformed.handles
+        has_corners = self.inner.is_hexahedron
         outside = np.flatnonzero(~self.outer.contains(handles))
         if len(outside):
             face, distance, k = max(
@@ -557,18 +558,17 @@ class Continuous(Edit):
             return (
                 f"outer cage must contain the inner cage: {deformed.handle_noun} {k} at"
                 f" {format_vector(handles[k])} is {distance:.3g} outside face {face}",
-                "; enlarge the outer cage" + self._or_discrete,
+                "; enlarge the outer cage"
+                + (" or make the edit discrete" if self.inner.is_hexahedron else ""),
             )
-        cure = f"; reduce it, or enlarge the outer cage{self._or_discrete}"
+        if has_corners:
+            cure = "; reduce it, enlarge the outer cage, or make the edit discrete"
+        else:
+            cure = "; reduce it" if self.outer.follows_edit else "; reduce it, or enlarge the outer cage"
         return (
             f"the {self.shell.name} shell {self._shell(deformed).problem()}",
             "" if deformed is self.inner else cure,
         )
-
-    @property
-    def _or_discrete(self) -> str:
-        """The second cure, which only cages with 8 corners have."""
-        return " or make the edit discrete" if self.inner.is_hexahedron else ""
 
     def _shell(self, deformed: Cage) -> Shell:
         if deformed is self.deformed:

@@ -78,7 +78,6 @@ from cagefield.errors import CagefieldError, EditError, EditFileError
 from cagefield.files.atomic import replaced_file
 from cagefield.files.safe_open import read_text
 from cagefield.geometry.cage import Cage
-from cagefield.geometry.reach_cage import ReachCage
 
 VERSION = 1
 MAX_EDITS = 500
@@ -319,7 +318,7 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
     if isinstance(edit, Paste):
         content["source"] = edit.source
     content["inner"] = dump_inner(edit.inner)
-    if settings.outer is not None and not isinstance(settings.outer, ReachCage):
+    if settings.outer is not None and not settings.outer.follows_edit:
         content["outer"] = dump_margin(edit.inner, settings.outer) or dump_cage(settings.outer)
     if edit.operations:
         content["operations"] = [dump_operation(operation) for operation in edit.operations]

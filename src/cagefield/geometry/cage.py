@@ -64,6 +64,9 @@ class Cage:
     is_hexahedron: ClassVar[bool] = True
     """False for cages of other shapes, whose `corners` are those of a box around them."""
 
+    follows_edit: ClassVar[bool] = False
+    """True for outer cages that are made anew with the operations of their edit."""
+
     has_own_falloff: ClassVar[bool] = False
     """True for cages that say how the motion fades around them, in place of the shell."""
 
@@ -304,6 +307,18 @@ class Cage:
         points = hexahedron.points(self.corners, bspline_lattice.grid(shape))
         return LatticeCage(points, shape, interpolation, pivot=self.pivot)
 
+    def mirrored(self, axis: int, at: float) -> Cage:
+        """The cage across the plane where coordinate `axis`, 0 to 2, is `at`.
+
+        A mirrored cage would be inside out, so its corners are numbered the other way along that axis.
+        """
+        corners = mirrored_points(self.corners[[self.mirrored_handle(k, axis) for k in range(8)]], axis, at)
+        return Cage(corners, pivot=mirrored_points(self.pivot, axis, at))
+
+    def mirrored_handle(self, handle: int, axis: int) -> int:
+        """The number, in the mirrored cage, of the mirror image of one of the `handles`."""
+        return handle ^ 1 << axis
+
     def _moved(self, points: Array, pivot: Array, *, rigid: bool = False) -> Cage:
         """The cage with its `handles` elsewhere; `rigid` where one affine map takes all of them there."""
         return Cage(points, pivot=pivot)
@@ -409,6 +424,13 @@ class LatticeCage(LatticePoints, Cage):
         for bits in hexahedron.BITS[list(corners)]:
             weight += np.where(bits == 1.0, u, 1.0 - u).prod(axis=1)
         return self._moved(self.control_points + weight[:, None] * by, self.pivot)
+
+
+def mirrored_points(points: Array, axis: int, at: float) -> Array:
+    """Points [...,3] across the plane where coordinate `axis` is `at`."""
+    mirrored = points.copy()
+    mirrored[..., axis] = 2.0 * at - mirrored[..., axis]
+    return mirrored
 
 
 def rotation_matrix(theta: ArrayLike) -> Array:

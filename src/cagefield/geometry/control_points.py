@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from cagefield.errors import CageError
 from cagefield.geometry import hexahedron
-from cagefield.geometry.cage import Axes, Cage
+from cagefield.geometry.cage import Axes, Cage, mirrored_points
 from cagefield.geometry.cage_checks import format_vector, read_only
 from cagefield.geometry.point_deformers import FALLOFFS
 from cagefield.typing import Array, Mask
@@ -139,6 +139,16 @@ class ControlPoints(Cage):
         for point in self.local_points:
             mask[near] |= ((y - point) ** 2).sum(axis=1) <= self.radius**2
         return mask
+
+    def mirrored(self, axis: int, at: float) -> ControlPoints:
+        """The points across the plane where coordinate `axis` is `at`; their numbers stay."""
+        F = np.diag(np.where(np.arange(3) == axis, -1.0, 1.0))
+        points, pivot = mirrored_points(self.points, axis, at), mirrored_points(self.pivot, axis, at)
+        return self._moved(points, pivot, linear=F @ self.linear @ F)
+
+    def mirrored_handle(self, handle: int, axis: int) -> int:
+        """The number itself: points keep theirs."""
+        return handle
 
     def subdivided(self, cells: Iterable[int], interpolation: str = "bspline") -> NoReturn:
         """Raises `CageError`: points have no cells."""

@@ -17,9 +17,13 @@ class ReachCage(Cage):
     Moved by hand it becomes an ordinary `Cage`.
     """
 
-    plural_noun: ClassVar[str] = "boxes"
+    follows_edit: ClassVar[bool] = True
 
     @classmethod
     def around(cls, box: Array) -> ReachCage:
         """The cage of a box [2,3] (min, max)."""
         return cls(np.asarray(box[0] + BITS * (box[1] - box[0])))
+
+    def mirrored(self, axis: int, at: float) -> ReachCage:
+        """The box across the plane where coordinate `axis` is `at`."""
+        return ReachCage(super().mirrored(axis, at).corners)

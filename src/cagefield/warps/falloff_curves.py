@@ -8,10 +8,11 @@ With s = 1 - d / r, d the distance and r the radius, the weight is 1 at s = 1 an
 Those of proportional editing in 3D editors. The square roots of sphere and root rise without a bound where
 the motion ends, at s = 0, and a flow needs one. Below a small e = `ROOT_END` of its argument q the root is
 
-    q (3 e - q) / (2 e^(3/2)),
+    sqrt(e) (5 u^2 - 3 u^3) / 2,    u = q / e,
 
-which goes on with the root's value and slope at q = e, and is no steeper than 3 / (2 sqrt(e)): at most 6 in s
-for both, in the outermost 13% (sphere) and 6% (root) of the radius.
+which goes on with the root's value and slope at q = e, begins with a slope of 0, where a jump would draw
+splats out into needles, and is no steeper than 25 / (18 sqrt(e)): in the outermost 13% (sphere) and 6% (root)
+of the radius.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from cagefield.typing import Array
 ROOT_END: dict[str, float] = {"sphere": 0.25, "root": 0.0625}
 """Argument of the root below which it is bounded."""
 
-STEEPEST: dict[str, float] = {"smooth": 1.5, "sphere": 6.0, "root": 6.0, "sharp": 2.0, "linear": 1.0}
+STEEPEST: dict[str, float] = {"smooth": 1.5, "sphere": 5.17, "root": 5.56, "sharp": 2.0, "linear": 1.0}
 """Largest slope of a curve by s."""
 
 
@@ -51,8 +52,7 @@ def curve(name: str, s: Array) -> tuple[Array, Array]:
 
 
 def _bounded_root(q: Array, end: float) -> tuple[Array, Array]:
-    root = np.sqrt(np.maximum(q, end))
-    scale = 0.5 * end**-1.5
+    root, u = np.sqrt(np.maximum(q, end)), q / end
     is_low = q < end
-    w = np.where(is_low, q * (3.0 * end - q) * scale, root)
-    return w, np.where(is_low, (3.0 * end - 2.0 * q) * scale, 0.5 / root)
+    w = np.where(is_low, np.sqrt(end) * u * u * (2.5 - 1.5 * u), root)
+    return w, np.where(is_low, u * (5.0 - 4.5 * u) / np.sqrt(end), 0.5 / root)

@@ -22,6 +22,12 @@ def problem(edit: Edit) -> str | None:
     return FOLDED if isinstance(edit.shell, Trilinear) else CLOSE
 
 
+def check_has_corners(edit: Edit) -> None:
+    """Raise `EditError` for an edit whose inner cage is not placed by 8 corners."""
+    if not edit.inner.is_hexahedron:
+        raise edit.error(f"{edit.inner.plural_noun} are not placed by corners; move them with the gizmo")
+
+
 def cause(reason: str) -> str:
     """A reason without its cure."""
     return reason.split(";")[0]

@@ -19,7 +19,7 @@ from cagefield.warps.kernels.control_points import PLACES, PLANES, RATES, SLOPE
 LANES = 256
 
 _SPHERE, _ROOT = ROOT_END["sphere"], ROOT_END["root"]
-_SPHERE_SCALE, _ROOT_SCALE = 0.5 * _SPHERE**-1.5, 0.5 * _ROOT**-1.5
+_SPHERE_SCALE, _ROOT_SCALE = _SPHERE**-1.5, _ROOT**-1.5
 _HALF_POWER = POWER // 2
 
 
@@ -32,12 +32,12 @@ def _weigh(number: int, s: Array) -> None:
     elif number == 1:
         for i in range(LANES):
             q = s[i] * (2.0 - s[i])
-            root, low = np.sqrt(max(q, _SPHERE)), q * (3.0 * _SPHERE - q) * _SPHERE_SCALE
+            root, low = np.sqrt(max(q, _SPHERE)), q * q * (2.5 - 1.5 / _SPHERE * q) * _SPHERE_SCALE
             s[i] = low if q < _SPHERE else root
     elif number == 2:
         for i in range(LANES):
             q = s[i]
-            root, low = np.sqrt(max(q, _ROOT)), q * (3.0 * _ROOT - q) * _ROOT_SCALE
+            root, low = np.sqrt(max(q, _ROOT)), q * q * (2.5 - 1.5 / _ROOT * q) * _ROOT_SCALE
             s[i] = low if q < _ROOT else root
     elif number == 3:
         for i in range(LANES):

@@ -28,8 +28,8 @@ _BLOCK = 1024
 @njit(cache=True, fastmath=True, error_model="numpy", inline="always")
 def _bounded_root(q: float, end: float) -> tuple[float, float]:
     if q < end:
-        scale = 0.5 / (end * np.sqrt(end))
-        return q * (3.0 * end - q) * scale, (3.0 * end - 2.0 * q) * scale
+        u = q / end
+        return np.sqrt(end) * u * u * (2.5 - 1.5 * u), u * (5.0 - 4.5 * u) / np.sqrt(end)
     root = np.sqrt(q)
     return root, 0.5 / root
 
