@@ -16,7 +16,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from cagefield.geometry import bspline_lattice
+from cagefield.geometry import bspline_lattice, hexahedron
 from cagefield.typing import Array
 
 Verdict: TypeAlias = Literal["proven", "folded", "undecided"]
@@ -113,7 +113,8 @@ def _cell_verdict(
         time, to_time, time_halves = _bernstein(3)
         a, b, c = (s[..., None, :] + time[:, None] * (e - s)[..., None, :] for s, e in columns)
         splits.append(time_halves)
-    det = np.einsum("...c,...c->...", a, np.cross(b, c))
+    a, b, c = (np.moveaxis(column, -1, 0) for column in (a, b, c))
+    det = (a * hexahedron.cross(b, c)).sum(axis=0)
     for axis in range(1, 4):
         det = np.moveaxis(np.tensordot(to_bernstein, det, axes=(1, axis)), 0, axis)
     if len(windows) == 2:

@@ -17,12 +17,12 @@ from cagefield.warps.lattice_way import Piece
 STEP_STRAIN = 0.8
 """Most h |dv/dz| of a step; one is one to one below 2, where 1 - h/2 dv/dz is invertible."""
 
-LEAST_STEPS, MOST_STEPS = 8, 96
+LEAST_STEPS, MOST_STEPS = 6, 96
 
 MARGIN = 1.0
 """Width around the lattice, in cells of the grid, in which all moves with it: as far as they interpolate."""
 
-SAMPLES = 64
+SAMPLES = 32
 """Most samples of a lattice, which its velocity far away is made of."""
 
 SLOPE = 0.75
@@ -70,12 +70,17 @@ class LatticeFlow:
         """Lengths [K] of the steps, in the time of their piece."""
         return self._velocities[1]
 
-    def through(self, z: Array, *, backwards: bool = False) -> tuple[Array, Array]:
-        """(Phi(z) [N,3], its Jacobians [N,3,3]) of z [N,3] in [-1,1]^3; backwards, those of Phi^-1."""
+    def through(
+        self, z: Array, *, backwards: bool = False, slopes: bool = True, enough: float = 1e-13
+    ) -> tuple[Array, Array]:
+        """(Phi(z) [N,3], its Jacobians [N,3,3]) of z [N,3] in [-1,1]^3; backwards, those of Phi^-1.
+
+        Without `slopes` the Jacobians are [0,3,3]; `enough` is the error of a step's midpoint.
+        """
         from cagefield.warps.kernels.lattice_flow import flow_points
 
-        moved, J = np.array(z, dtype=np.float64), np.tile(np.eye(3), (len(z), 1, 1))
-        flow_points(self.velocities, self.steps, backwards, 1e-13, moved, J)
+        moved, J = np.array(z, dtype=np.float64), np.tile(np.eye(3), (len(z) if slopes else 0, 1, 1))
+        flow_points(self.velocities, self.steps, backwards, enough, moved, J)
         return moved, J
 
     @cached_property
@@ -87,15 +92,14 @@ class LatticeFlow:
 
     def _slices(self, piece: Piece) -> tuple[Float32, float]:
         """(velocities [K,G,G,G,3] of a piece, most h |dv/dz|), in as many steps as it takes."""
-        steps = LEAST_STEPS
-        # The middle of the way tells how many; all of them are made once that is known.
-        for _ in range(3):
+        # Three times tell how many; where others are strained more, all are made again.
+        strain = 1.05 * max(slope_bound(self._slice(piece, s)) for s in (0.08, 0.5, 0.92))
+        steps = 0
+        while steps == 0 or (strain > steps * STEP_STRAIN and steps < MOST_STEPS):
+            steps = int(np.clip(np.ceil(strain / STEP_STRAIN), LEAST_STEPS, MOST_STEPS))
             slices = np.stack([self._slice(piece, (k + 0.5) / steps) for k in range(steps)])
-            strain = max(slope_bound(part) for part in slices) / steps
-            if strain <= STEP_STRAIN or steps == MOST_STEPS:
-                break
-            steps = min(int(np.ceil(1.05 * steps * strain / STEP_STRAIN)), MOST_STEPS)
-        return slices, strain
+            strain = max(slope_bound(part) for part in slices)
+        return slices, strain / steps
 
     def _slice(self, piece: Piece, s: float) -> Float32:
         """The velocity [G,G,G,3] at time s of a piece."""

@@ -15,8 +15,9 @@ from cagefield.warps.falloff import Falloff
 from cagefield.warps.interfaces import InnerMap, NoInnerMap
 from cagefield.warps.lattice_flow import LatticeFlow, outer_distance, outer_distance_gradient
 from cagefield.warps.lattice_way import Piece, pieces_between
+from cagefield.warps.newton_inverse import inverted
 
-GRIDS: tuple[int, ...] = (24, 36, 48)
+GRIDS: tuple[int, ...] = (20, 32, 48)
 """Cells of the velocity's grid along each axis of the outer cage, tried one after the other."""
 
 MOST_CORRECTION = 0.9
@@ -42,9 +43,7 @@ class LatticeShell:
     the map equals L on the lattice's faces whatever Phi is; the better Phi follows, the less is left to r.
 
     One to one: L and its way by Bernstein coefficients, Phi step by step by a bound of its slope, R where the
-    slope of rho r is below 1, of which the largest of 9 (places a face sample) is taken.
-
-    Measured over `benchmarks/lattice_profiles.py`, see there.
+    slope of rho r is below 1, which is sampled (`Surroundings.slope`), not proven.
 
     Parameters: the canonical and the deformed inner cage, the outer cage, the falloff.
     """
@@ -110,12 +109,15 @@ class LatticeShell:
         A, b = self.inner.affine
         out = np.empty((resolution**3, 3), dtype=np.float32)
         origin, frame = self.outer.frame
+        padded = np.zeros((*flow.velocities.shape[:-1], 4), dtype=np.float32)
+        padded[..., :3] = flow.velocities
         sample_nodes(
-            flow.velocities,
+            padded.reshape(-1),
+            np.uintp(flow.cells + 1),
             flow.steps,
             np.concatenate([flow.confines.center[None], flow.confines.inverse, flow.confines.frame]),
             flow.confines.heights,
-            np.concatenate([b[None], A, np.linalg.inv(A)]),
+            np.concatenate([b[None], np.linalg.inv(A), A]),
             around.padded,
             self.deformed.interpolation == "linear",
             around.face_table,
@@ -269,16 +271,13 @@ class Surroundings:
         return u.clip(0.0, 1.0), inside
 
     def uncorrected(self, q: Array) -> Array:
-        """X [N,3] with R(X) = q [N,3], by iteration: R differs from the identity by a contraction."""
-        X, rows = q.copy(), np.arange(len(q))
-        for _ in range(100):
-            trial = q[rows] - self.correction(X[rows])[0]
-            change = np.abs(trial - X[rows]).max(axis=1, initial=0.0)
-            X[rows] = trial
-            rows = rows[change > 1e-13 * np.abs(self.flow.outer.corners).max()]
-            if len(rows) == 0:
-                break
-        return X
+        """X [N,3] with R(X) = q [N,3], by Newton's method."""
+
+        def corrected(X: Array) -> tuple[Array, Array]:
+            change, slope = self.correction(X)
+            return X + change, np.eye(3) + slope
+
+        return inverted(corrected, q, q, float(np.abs(self.flow.outer.corners).max()))[0]
 
     # ---- samples of the faces ----
 
@@ -292,12 +291,18 @@ class Surroundings:
             for side in range(2):
                 face = u[2 * axis + side]
                 face[:, axis], face[:, (axis + 1) % 3], face[:, (axis + 2) % 3] = side, b, c
-        return self.residual(u.reshape(-1, 3))[0].reshape(6, n, n, 3)
+        A, b = self.inner.affine
+        u = u.reshape(-1, 3)
+        z, _ = self.flow.through(
+            self._in_outer(self.lattice(u)[0]), backwards=True, slopes=False, enough=1e-6
+        )
+        back = hexahedron.points(self.flow.outer.corners, 0.5 * (z + 1.0))
+        return np.asarray((back - (b + u @ A.T)).reshape(6, n, n, 3))
 
     @cached_property
     def _samples(self) -> tuple[Array, Array, Array]:
         """(u [S,3] of an even grid on the canonical cage's faces, r [S,3], dr/dX [S,3,3] there)."""
-        u = bspline_lattice.grid((13, 13, 13))
+        u = bspline_lattice.grid((15, 15, 15))
         u = u[(np.abs(u - 0.5) == 0.5).any(axis=1)]
         return u, *self.residual(u)
 
@@ -308,7 +313,7 @@ class Surroundings:
 
     @cached_property
     def slope(self) -> float:
-        """Largest |d(rho r)/dX| at 4 distances from each sample of the canonical cage's faces."""
+        """Largest |d(rho r)/dX| (Frobenius norm) at 4 distances from each face sample."""
         u, r, dr = self._samples
         A, b = self.inner.affine
         outwards = np.where(np.abs(u - 0.5) == 0.5, u - 0.5, 0.0)
@@ -319,7 +324,7 @@ class Surroundings:
         most = 0.0
         for share in (1e-3, 0.15, 0.35, 0.6):
             X = b + (u + outwards * (share * room / lengths)[:, None]) @ A.T
-            most = max(most, float(np.linalg.norm(self._faded(X, r, dr)[1], ord=2, axis=(1, 2)).max()))
+            most = max(most, float(np.linalg.norm(self._faded(X, r, dr)[1], axis=(1, 2)).max()))
         return most
 
 

@@ -223,8 +223,7 @@ def _meet_lattice(P, linear, margin, near, work):
     target, u = near[0:3], near[3:6]
     if not invert_lattice_point(P[0], linear, target, u, 1e-3 * margin, work):
         return
-    x, J, weights = work[0, :3], work[1:4, :3], work[7:10]
-    lattice_point(P[0], linear, u, x, J, weights)
+    x, J, weights = work[0, :3], work[1:4, :3], work[7:10]  # J is that at u
     square = 0.0
     for i in range(3):
         e = u[i] - min(max(u[i], 0.0), 1.0)
@@ -262,12 +261,12 @@ def _fill_batch(places, reach, dz, frame, samples, P, linear, blur, margin, fall
         m0 = np.float32(0.0)
         m1 = np.float32(0.0)
         m2 = np.float32(0.0)
-        one, zero = np.float32(1.0), np.float32(0.0)
-        for j in range(count):
+        one, zero, blurred = np.float32(1.0), np.float32(0.0), np.float32(blur)
+        for j in range(np.uintp(count)):
             a = y0 - samples[0, j]
             b = y1 - samples[1, j]
             c = y2 - samples[2, j]
-            r = a * a + b * b + c * c + blur
+            r = a * a + b * b + c * c + blurred
             k = one / (r * r * r)
             u0 = samples[9, j] * a + samples[10, j] * b + samples[11, j] * c
             u1 = samples[12, j] * a + samples[13, j] * b + samples[14, j] * c
@@ -291,7 +290,7 @@ def _fill_batch(places, reach, dz, frame, samples, P, linear, blur, margin, fall
         near[0], near[1], near[2] = y0, y1, y2
         near[3], near[4], near[5] = m0 * scale, m1 * scale, m2 * scale
         near[6], near[7], near[8], near[9] = d0 * scale, d1 * scale, d2 * scale, np.float64(away) * scale
-        if near[9] < 3.0 * margin:
+        if near[9] < 2.5 * margin:
             _meet_lattice(P, linear, margin, near, work)
         far = 1.0 / reach[n]
         w = fade(max(near[9] - min(margin, 0.5 * far), 0.0) * reach[n], falloff[0], falloff[1], falloff[2])
