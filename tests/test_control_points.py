@@ -5,7 +5,7 @@ import pytest
 
 from cagefield.errors import CageError
 from cagefield.geometry.cage import Cage
-from cagefield.geometry.control_points import MAX_POINTS, ControlPoints
+from cagefield.geometry.control_points import MAX_CONTROL_POINTS, ControlPoints
 
 THREE = np.array([[0.0, 0, 0], [1.0, 0, 0], [0.0, 2.0, 0]])
 
@@ -63,7 +63,7 @@ def test_equality_knows_radius_falloff_and_kind() -> None:
     [
         (lambda: ControlPoints([[0, 0]], 1), "1 to 256 points of 3 numbers, got shape \\[1, 2\\]"),
         (lambda: ControlPoints([], 1), "1 to 256 points of 3 numbers"),
-        (lambda: ControlPoints(np.zeros((MAX_POINTS + 1, 3)), 1), "got shape \\[257, 3\\]"),
+        (lambda: ControlPoints(np.zeros((MAX_CONTROL_POINTS + 1, 3)), 1), "got shape \\[257, 3\\]"),
         (lambda: ControlPoints("nose", 1), "got 'nose'"),
         (lambda: ControlPoints([[0, 0, 0], [0, np.nan, 0]], 1), "control point 1 must be finite"),
         (lambda: ControlPoints([[0, 0, 0], [1, 0, 0], [0, 0, 0]], 1), "control points 0 and 2 are both at"),

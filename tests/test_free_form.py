@@ -9,9 +9,9 @@ import pytest
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 from cagefield.warps.free_form import (
-    MOST_STEPS,
+    BOUND_TIMES,
+    MAX_PROVEN_STEPS,
     PROVEN,
-    TIMES,
     FreeFormFlow,
     march,
     proven_knots,
@@ -32,7 +32,7 @@ class Turning:
         return points @ G.T, np.broadcast_to(G, (len(points), 3, 3))
 
     def slope_bounds(self) -> Array:
-        return np.full(len(TIMES) - 1, self.angle)
+        return np.full(len(BOUND_TIMES) - 1, self.angle)
 
     def march(self, points: Array, knots: Array, jacobians: bool = True) -> tuple[Array, Array]:
         x, J = march(self, points, knots)
@@ -56,7 +56,7 @@ def test_no_step_is_longer_than_is_proven(strain: float) -> None:
         bounds = np.exp(rng.normal(0.0, 2.0, 64))
         knots = proven_knots(bounds, strain)
         assert knots[0] == 0.0 and knots[-1] == 1.0 and (np.diff(knots) > 0.0).all()
-        if len(knots) - 1 > MOST_STEPS:
+        if len(knots) - 1 > MAX_PROVEN_STEPS:
             continue
         # Bounds over a finer grid of times than the intervals.
         for low, high in pairwise(knots):
@@ -69,7 +69,7 @@ def test_no_step_is_longer_than_is_proven(strain: float) -> None:
 def test_a_velocity_without_a_bound_is_refused() -> None:
     bounds = np.ones(64)
     bounds[10] = np.inf
-    assert len(proven_knots(bounds, 0.25)) > MOST_STEPS
+    assert len(proven_knots(bounds, 0.25)) > MAX_PROVEN_STEPS
 
     class Endless(Turning):
         def slope_bounds(self) -> Array:

@@ -9,7 +9,7 @@ from cagefield.edits.file_nodes import Node
 from cagefield.edits.operations import Operation
 from cagefield.geometry.point_deformers import AXES, FALLOFFS, FIXED
 
-MAX_POINTS = 512
+MAX_HANDLES = 512
 """Points of any inner cage: lattices have up to 8 along each axis."""
 
 _SHEARS = ("xy", "xz", "yx", "yz", "zx", "zy")
@@ -64,10 +64,10 @@ def parse_operation(node: Node) -> Operation:
         return operations.MoveCorners(corners, parts["by"].vector())
     if name == "move_point":
         parts = value.mapping(required=("point", "by"))
-        return operations.MovePoint(parts["point"].integer(0, MAX_POINTS - 1), parts["by"].vector())
+        return operations.MovePoint(parts["point"].integer(0, MAX_HANDLES - 1), parts["by"].vector())
     if name == "move_points":
         parts = value.mapping(required=("points", "by"), optional=("radius", "falloff"))
-        points = tuple(point.integer(0, MAX_POINTS - 1) for point in parts["points"].items())
+        points = tuple(point.integer(0, MAX_HANDLES - 1) for point in parts["points"].items())
         radius = parts["radius"].number() if "radius" in parts else 0.0
         falloff = parts["falloff"].choice(FALLOFFS) if "falloff" in parts else "smooth"
         return operations.MovePoints(points, parts["by"].vector(), radius, falloff)

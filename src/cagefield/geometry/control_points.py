@@ -17,7 +17,7 @@ from cagefield.geometry.cage_checks import format_vector, read_only
 from cagefield.geometry.point_deformers import FALLOFFS
 from cagefield.typing import Array, Mask
 
-MAX_POINTS = 256
+MAX_CONTROL_POINTS = 256
 """Control points of an edit: a map evaluates all of them at each of its points."""
 
 LEAST_SPACING = 1e-6
@@ -29,7 +29,7 @@ class ControlPoints(Cage):
     """Points that are dragged, with everything around them up to a radius going along, less and less.
 
     Parameters
-    - points: [n,3] world units, n from 1 to `MAX_POINTS`.
+    - points: [n,3] world units, n from 1 to `MAX_CONTROL_POINTS`.
     - radius: reach of each point, world units, > 0.
     - falloff: one of `FALLOFFS`.
     - pivot: [3], about which `rotate`, `scale` and `shear` turn; the mean of the points if left out.
@@ -194,9 +194,9 @@ def _points(value: ArrayLike) -> Array:
         shape = np.shape(np.array(value, dtype=np.float64))
     except (TypeError, ValueError):
         shape = ()
-    if len(shape) != 2 or shape[1] != 3 or not 1 <= shape[0] <= MAX_POINTS:
+    if len(shape) != 2 or shape[1] != 3 or not 1 <= shape[0] <= MAX_CONTROL_POINTS:
         raise CageError(
-            f"control points must be 1 to {MAX_POINTS} points of 3 numbers, got"
+            f"control points must be 1 to {MAX_CONTROL_POINTS} points of 3 numbers, got"
             + (f" shape {list(shape)}" if shape else f" {value!r:.60}")
         )
     points = np.array(value, dtype=np.float64)

@@ -17,10 +17,10 @@ import numpy as np
 
 from cagefield.geometry.control_points import ControlPoints
 from cagefield.typing import Array
-from cagefield.warps.free_form import TIMES
+from cagefield.warps.free_form import BOUND_TIMES
 from cagefield.warps.linear_motion import LinearMotion
 
-POWER = 12
+DISTANCE_POWER = 12
 """Exponent p of the distance from all points, see `ControlPointVelocity`."""
 
 
@@ -54,7 +54,7 @@ class ControlPointMotion:
     @cached_property
     def reach(self) -> float:
         """Distance |y - y_j| from all points j from which on nothing moves: r n^(1/p)."""
-        return float(self.radius * len(self.inner.points) ** (1.0 / POWER))
+        return float(self.radius * len(self.inner.points) ** (1.0 / DISTANCE_POWER))
 
     def centers(self, t: Array) -> Array:
         """c [T,3] at times t [T]."""
@@ -89,9 +89,9 @@ class ControlPointMotion:
 
     @cached_property
     def _way(self) -> tuple[Array, Array]:
-        """(p_j [T,n,3], F [T,3,3]) at `TIMES`."""
-        F, _ = self.linear.at(TIMES)
-        p = self.centers(TIMES)[:, None] + self.local_points(TIMES) @ np.transpose(F, (0, 2, 1))
+        """(p_j [T,n,3], F [T,3,3]) at `BOUND_TIMES`."""
+        F, _ = self.linear.at(BOUND_TIMES)
+        p = self.centers(BOUND_TIMES)[:, None] + self.local_points(BOUND_TIMES) @ np.transpose(F, (0, 2, 1))
         return p, F
 
     def extents(self, normals: Array) -> tuple[Array, Array]:
@@ -100,7 +100,7 @@ class ControlPointMotion:
         Bounds at all times, not samples.
         """
         p, F = self._way
-        step = float(TIMES[1])
+        step = float(BOUND_TIMES[1])
         # Between two times a point is within h^2 / 8 of its acceleration from the chord.
         slack = 0.125 * step * step * self.acceleration_bound()
         along = (p.reshape(-1, 3) @ normals.T).max(axis=0)
@@ -116,12 +116,12 @@ class ControlPointMotion:
         return np.stack([-high[3:], high[:3]])
 
     def separations(self) -> Array:
-        """Least |y_i - y_j| [I,n,n] in each interval of `TIMES`; infinite between a point and itself."""
+        """Least |y_i - y_j| [I,n,n] in each interval of `BOUND_TIMES`; infinite for a point and itself."""
         start = self.inner.local_points[:, None] - self.inner.local_points[None]
         rate = self.rates[:, None] - self.rates[None]
         speed = (rate * rate).sum(axis=2)
         closest = -(start * rate).sum(axis=2) / np.where(speed > 0.0, speed, 1.0)
-        t = np.clip(closest, TIMES[:-1, None, None], TIMES[1:, None, None])
+        t = np.clip(closest, BOUND_TIMES[:-1, None, None], BOUND_TIMES[1:, None, None])
         found = np.linalg.norm(start + t[..., None] * rate, axis=3)
         n = len(start)
         found[:, np.arange(n), np.arange(n)] = np.inf

@@ -32,10 +32,10 @@ from cagefield.geometry.cage import Cage
 from cagefield.geometry.control_points import LEAST_SPACING, ControlPoints
 from cagefield.typing import Array
 from cagefield.warps.cage_maps import flow_between, inner_map_between, reach_between
-from cagefield.warps.control_point_motion import POWER, ControlPointMotion
+from cagefield.warps.control_point_motion import DISTANCE_POWER, ControlPointMotion
 from cagefield.warps.falloff import Falloff
 from cagefield.warps.falloff_curves import STEEPEST, curve, curve_number
-from cagefield.warps.free_form import TIMES, FreeFormFlow
+from cagefield.warps.free_form import BOUND_TIMES, FreeFormFlow
 from cagefield.warps.interfaces import InnerMap, NoInnerMap, Shell
 from cagefield.warps.outer_planes import OuterPlanes
 
@@ -120,9 +120,9 @@ class ControlPointVelocity:
         rows = np.flatnonzero(nearest < motion.reach)
         x, y, away, d_j, nearest = x[rows], y[rows], away[rows], d_j[rows], nearest[rows]
         toward = away / d_j[:, :, None]
-        share = (nearest[:, None] / d_j) ** POWER
-        d = nearest * share.sum(axis=1) ** (-1.0 / POWER)
-        d_slope = (((d[:, None] / d_j) ** (POWER + 1))[:, :, None] * toward).sum(axis=1)
+        share = (nearest[:, None] / d_j) ** DISTANCE_POWER
+        d = nearest * share.sum(axis=1) ** (-1.0 / DISTANCE_POWER)
+        d_slope = (((d[:, None] / d_j) ** (DISTANCE_POWER + 1))[:, :, None] * toward).sum(axis=1)
         w, slope = curve(self.inner.falloff, 1.0 - d / r)
         b = (nearest[:, None] / d_j) ** BLEND_POWER
         b /= b.sum(axis=1, keepdims=True)
@@ -141,9 +141,9 @@ class ControlPointVelocity:
         return v, G
 
     def slope_bounds(self) -> Array:
-        """Bounds L [I] of |dv/dx| at all points, and all times between each of `TIMES` and the next."""
-        motion, h = self.motion, float(TIMES[1])
-        F, dF = motion.linear.at(TIMES)
+        """Bounds L [I] of |dv/dx| at all points, and all times between each of `BOUND_TIMES` and the next."""
+        motion, h = self.motion, float(BOUND_TIMES[1])
+        F, dF = motion.linear.at(BOUND_TIMES)
         angle, stretch = motion.linear.rates
         growth = np.exp(0.5 * h * stretch)
         size = _larger(np.linalg.norm(F, ord=2, axis=(1, 2))) * growth
@@ -151,9 +151,9 @@ class ControlPointVelocity:
         rate = _larger(np.linalg.norm(dF, ord=2, axis=(1, 2)))
         rate += 0.5 * h * (2.0 * angle * stretch + (angle + stretch) ** 2) * size
         differences = np.linalg.norm(motion.rates[:, None] - motion.rates[None], axis=2)
-        speed = _larger(np.linalg.norm(motion.velocities(TIMES), axis=2).max(axis=1))
+        speed = _larger(np.linalg.norm(motion.velocities(BOUND_TIMES), axis=2).max(axis=1))
         speed += 0.5 * h * motion.acceleration_bound() + rate * motion.reach + size * differences.max()
-        blend = np.zeros(len(TIMES) - 1)
+        blend = np.zeros(len(BOUND_TIMES) - 1)
         if differences.any():
             with np.errstate(divide="ignore"):
                 ratios = differences / motion.separations()

@@ -23,15 +23,15 @@ from cagefield.typing import Array, Float32
 from cagefield.warps.interfaces import InnerMap
 from cagefield.warps.newton_inverse import inverted
 
-STRAIN = 0.25
+EXACT_STEP_STRAIN = 0.25
 """Integral of L over a step, at most."""
 
 PROVEN = 0.69
 """Most h L of a step that is proven to be one to one; see above."""
 
-LEAST_STEPS, MOST_STEPS = 4, 1024
+MIN_PROVEN_STEPS, MAX_PROVEN_STEPS = 4, 1024
 
-TIMES: Array = np.linspace(0.0, 1.0, 65)
+BOUND_TIMES: Array = np.linspace(0.0, 1.0, 65)
 """Ends of the intervals in which the velocity's slope is bounded."""
 
 _CHUNK = 262_144
@@ -45,7 +45,7 @@ class Velocity(Protocol):
         """(v [N,3], dv/dx [N,3,3]) at points [N,3] and a time."""
 
     def slope_bounds(self) -> Array:
-        """Bounds L [I] of |dv/dx| at all points, and all times between each of `TIMES` and the next."""
+        """Bounds L [I] of |dv/dx| at all points, and all times between each of `BOUND_TIMES` and the next."""
 
     def march(self, points: Array, knots: Array, jacobians: bool = True) -> tuple[Array, Array]:
         """(points [N,3], Jacobians [N,3,3]) at the last of the knots [K+1], of points at the first.
@@ -62,12 +62,12 @@ class FreeFormFlow:
     """The map of V^o onto itself by the flow of a velocity; a `Shell` that is valid in all of V^o.
 
     `to_canonical` goes backwards through the knots, with the Jacobian of the discrete scheme; `to_deformed`
-    inverts it as computed. `strain` is the most that a step strains, see `STRAIN`.
+    inverts it as computed. `strain` is the most that a step strains, see `EXACT_STEP_STRAIN`.
     """
 
     velocity: Velocity
     outer: Cage
-    strain: float = STRAIN
+    strain: float = EXACT_STEP_STRAIN
 
     @cached_property
     def knots(self) -> Array:
@@ -132,9 +132,11 @@ class FreeFormFlow:
         problem = self.velocity.problem()
         if problem is not None:
             return problem
-        if not (np.isfinite(self._slope_bounds).all() and len(self.knots) - 1 <= MOST_STEPS):
+        if not (np.isfinite(self._slope_bounds).all() and len(self.knots) - 1 <= MAX_PROVEN_STEPS):
             strain = float(self._slope_bounds.mean())
-            return f"would be strained by {strain:.3g}, and at most {PROVEN * MOST_STEPS:.3g} is possible"
+            return (
+                f"would be strained by {strain:.3g}, and at most {PROVEN * MAX_PROVEN_STEPS:.3g} is possible"
+            )
         return None
 
 
@@ -142,19 +144,19 @@ def proven_knots(slope_bounds: Array, strain: float) -> Array:
     """Times [K+1] from 0 to 1 for bounds L [I] of the slope in I equal intervals of time.
 
     No step has an integral of L above `strain`, nor h L above `PROVEN`; there are no more than twice
-    `MOST_STEPS` steps, where that would take more.
+    `MAX_PROVEN_STEPS` steps, where that would take more.
     """
     intervals = len(slope_bounds)
     ends = np.linspace(0.0, 1.0, intervals + 1)
     rate = np.maximum(slope_bounds, 1e-9)
     total = np.concatenate([[0.0], np.cumsum(rate * np.diff(ends))])
     wanted = np.ceil(total[-1] / strain) if np.isfinite(total[-1]) else np.inf
-    steps = int(np.clip(wanted, LEAST_STEPS, 2 * MOST_STEPS))
+    steps = int(np.clip(wanted, MIN_PROVEN_STEPS, 2 * MAX_PROVEN_STEPS))
     if not np.isfinite(total[-1]):
         return np.linspace(0.0, 1.0, steps + 1)
     knots = np.interp(np.linspace(0.0, total[-1], steps + 1), total, ends)
     knots[0], knots[-1] = 0.0, 1.0
-    while len(knots) <= 2 * MOST_STEPS:
+    while len(knots) <= 2 * MAX_PROVEN_STEPS:
         first = np.minimum(np.floor(knots[:-1] * intervals).astype(np.intp), intervals - 1)
         last = np.maximum(np.ceil(knots[1:] * intervals).astype(np.intp), first + 1)
         steepest = np.array([rate[i:j].max() for i, j in zip(first, last, strict=True)])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cagefield.compute.numba_cache import njit
 from cagefield.typing import Array
-from cagefield.warps.control_point_motion import POWER
+from cagefield.warps.control_point_motion import DISTANCE_POWER
 from cagefield.warps.falloff_curves import ROOT_END
 from cagefield.warps.kernels.control_points import PLACES, PLANES, RATES, SLOPE
 
@@ -20,7 +20,7 @@ LANES = 256
 
 _SPHERE, _ROOT = ROOT_END["sphere"], ROOT_END["root"]
 _SPHERE_SCALE, _ROOT_SCALE = _SPHERE**-1.5, _ROOT**-1.5
-_HALF_POWER = POWER // 2
+_HALF_POWER = DISTANCE_POWER // 2
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
@@ -93,7 +93,7 @@ def _velocities(
                 q = near[i] / max(a0 * a0 + a1 * a1 + a2 * a2, least)
                 total[i] += q**_HALF_POWER
         for i in range(LANES):
-            w[i] = max(1.0 - np.sqrt(near[i]) * total[i] ** (-1.0 / POWER) / r, 0.0)
+            w[i] = max(1.0 - np.sqrt(near[i]) * total[i] ** (-1.0 / DISTANCE_POWER) / r, 0.0)
     _weigh(int(head[0]), w)
     if fade > 0.0:
         for k in range(PLANES, PLANES + 24, 4):

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from cagefield.compute.numba_cache import njit
 from cagefield.typing import Array
-from cagefield.warps.control_point_motion import POWER
+from cagefield.warps.control_point_motion import DISTANCE_POWER
 from cagefield.warps.falloff_curves import ROOT_END
 
 PLANES, RATES = 8, 32
 INVERSE, SLOPE, PLACES = 12, 21, 30
 
 _SPHERE, _ROOT = ROOT_END["sphere"], ROOT_END["root"]
-_HALF_POWER = POWER // 2
+_HALF_POWER = DISTANCE_POWER // 2
 _BLOCK = 1024
 
 
@@ -79,7 +79,7 @@ def _velocity(head: Array, now: Array, n: int, x: Array, v: Array, G: Array, e: 
             a0, a1, a2 = y0 - now[30 + 3 * j], y1 - now[31 + 3 * j], y2 - now[32 + 3 * j]
             q = nearest / max(a0 * a0 + a1 * a1 + a2 * a2, least)
             total += q**_HALF_POWER
-        d *= total ** (-1.0 / POWER)
+        d *= total ** (-1.0 / DISTANCE_POWER)
         if d >= r:
             return False
         for j in range(n):
