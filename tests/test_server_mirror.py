@@ -7,8 +7,9 @@ import pytest
 
 from cagefield.edits import Edit
 from cagefield.edits import operations as ops
+from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
-from cagefield.server.editor.mirror import mirror_edit
+from cagefield.server.editor.mirror import mirror_edit, mirrored_operation
 
 INNER = Cage.box((0.2, 0.1, -0.1), (0.5, 0.4, 0.3), (0.3, -0.2, 0.5))
 OPERATIONS: tuple[ops.Operation, ...] = (
@@ -74,3 +75,22 @@ def test_control_points_are_mirrored_with_their_operations(axis: int, operation:
     np.testing.assert_allclose(
         np.sort(other.outer.aabb, axis=0), np.sort(reflected(edit.outer.aabb, axis, 0.3), axis=0)
     )
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_lattice_is_mirrored_with_its_points(axis: int) -> None:
+    lattice = INNER.subdivided((1, 2, 3))
+    moved = lattice.move_point(7, (0.02, -0.01, 0.03)).move_points((0, 11), (-0.02, 0.01, 0.0))
+    other = lattice.mirrored(axis, 0.3)
+    for operation in (ops.MovePoint(7, (0.02, -0.01, 0.03)), ops.MovePoints((0, 11), (-0.02, 0.01, 0.0))):
+        other = mirrored_operation(operation, axis, lattice).apply(other)
+    expected = moved.mirrored(axis, 0.3)
+    np.testing.assert_allclose(other.handles, expected.handles, atol=1e-12)
+    # Its inside is the mirror image, too.
+    inside = INNER.corners.mean(axis=0) + np.random.default_rng(0).uniform(-0.3, 0.3, (300, 3))
+    assert np.array_equal(moved.contains(inside), expected.contains(reflected(inside, axis, 0.3)))
+
+
+def test_a_bend_is_not_mirrored() -> None:
+    with pytest.raises(EditError, match="a bend cannot be mirrored"):
+        mirrored_operation(ops.Bend("z", 30.0), 0, INNER.subdivided((1, 1, 3)))

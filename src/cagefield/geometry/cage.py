@@ -406,6 +406,18 @@ class LatticeCage(LatticePoints, Cage):
             and np.array_equal(self.control_points, other.control_points)
         )
 
+    def mirrored(self, axis: int, at: float) -> LatticeCage:
+        """The lattice across the plane where coordinate `axis` is `at`, numbered the other way along it."""
+        order = [self.mirrored_handle(k, axis) for k in range(len(self.handles))]
+        points, pivot = mirrored_points(self.handles[order], axis, at), mirrored_points(self.pivot, axis, at)
+        return LatticeCage(points, self.shape, self.interpolation, pivot=pivot, proven=True)
+
+    def mirrored_handle(self, handle: int, axis: int) -> int:
+        """The number, in the mirrored lattice, of the mirror image of a control point."""
+        at = list(np.unravel_index(handle, self.shape, order="F"))
+        at[axis] = self.shape[axis] - 1 - at[axis]
+        return int(np.ravel_multi_index(tuple(at), self.shape, order="F"))
+
     def subdivided(self, cells: Iterable[int], interpolation: str = "bspline") -> LatticeCage:
         """The lattice's even grid with other cells; raises `CageError` once points have been moved."""
         if not self.is_affine:

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from cagefield.edits import Edit
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation, Triple
+from cagefield.errors import EditError
 from cagefield.geometry.cage import FACES, Cage
 from cagefield.typing import Array
 
@@ -46,6 +47,8 @@ def mirrored_operation(operation: Operation, axis: int, cage: Cage) -> Operation
         factors = operation.factors.items()
         values = {pair: -value if name in pair and value else value for pair, value in factors}
         return ops.Shear(**values, axes=operation.axes)
+    if isinstance(operation, ops.Bend | ops.Twist | ops.Taper):
+        raise EditError(f"a {operation.noun} cannot be mirrored; move the lattice's points instead")
     by = _flipped(operation.by, axis)
     if isinstance(operation, ops.MoveCorner):
         return ops.MoveCorner(operation.corner ^ 1 << axis, by)
