@@ -8,7 +8,7 @@ from cagefield.edits import Continuous, Edit
 from cagefield.edits import operations as ops
 from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage
-from cagefield.geometry.point_deformers import FALLOFFS, FIXED
+from cagefield.geometry.point_deformers import FALLOFF_CURVES, FIXED
 
 KINDS = ("point", "points", "bend", "twist", "taper", "translate", "rotate", "scale", "corner")
 PLACES = tuple(map(str, FIXED))
@@ -22,7 +22,7 @@ def random_operation(rng: np.random.Generator, points: int) -> ops.Operation:
         return ops.MovePoint(int(rng.integers(points)), by)
     if kind == "points":
         chosen = rng.choice(points, min(points, int(rng.integers(1, 6))), replace=False)
-        radius, falloff = float(rng.uniform(0.0, 0.6)), str(rng.choice(FALLOFFS))
+        radius, falloff = float(rng.uniform(0.0, 0.6)), str(rng.choice(FALLOFF_CURVES))
         return ops.MovePoints(tuple(int(n) for n in chosen), by, radius, falloff)
     if kind == "bend":
         return ops.Bend(axis, float(rng.uniform(-200, 200)), "", fixed)

@@ -6,7 +6,7 @@ import numpy as np
 
 from cagefield.edits import Continuous, Edit
 from cagefield.geometry.cage import Cage
-from cagefield.geometry.point_deformers import FALLOFFS
+from cagefield.geometry.point_deformers import FALLOFF_CURVES
 from cagefield.typing import Array
 
 OUTER = Cage.box((0, 0, 0), 6.0)
@@ -19,7 +19,7 @@ def random_edit(seed: int) -> Continuous:
     points = 0.4 * np.stack(np.unravel_index(rng.permutation(27)[:count], (3, 3, 3)), axis=1) - 0.4
     points = points + rng.uniform(-0.1, 0.1, (count, 3))
     outer = None if rng.random() < 0.5 else Cage.box((0, 0, 0), 3.2, rng.uniform(-0.2, 0.2, 3))
-    edit = Edit.points(points, radius=0.5, falloff=FALLOFFS[seed % len(FALLOFFS)], outer=outer)
+    edit = Edit.points(points, radius=0.5, falloff=FALLOFF_CURVES[seed % len(FALLOFF_CURVES)], outer=outer)
     edit = edit.translate(rng.normal(0.0, 0.25, 3))
     if rng.random() < 0.7:
         edit = edit.rotate(rng.normal(0.0, 0.8, 3))

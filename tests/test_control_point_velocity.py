@@ -6,7 +6,7 @@ import pytest
 from cagefield.edits import Continuous, Edit
 from cagefield.geometry.cage import Cage
 from cagefield.geometry.control_points import ControlPoints
-from cagefield.geometry.point_deformers import FALLOFFS, falloff_weight
+from cagefield.geometry.point_deformers import FALLOFF_CURVES, falloff_weight
 from cagefield.warps.control_point_velocity import ControlPointVelocity
 from cagefield.warps.falloff_curves import ROOT_END, STEEPEST, curve
 from cagefield.warps.free_form import FreeFormFlow, march
@@ -19,7 +19,7 @@ def velocity_of(edit: Continuous) -> ControlPointVelocity:
     return shell.velocity
 
 
-@pytest.mark.parametrize("name", FALLOFFS)
+@pytest.mark.parametrize("name", FALLOFF_CURVES)
 def test_curves_are_those_of_3d_editors_but_where_their_slope_has_no_bound(name: str) -> None:
     s = np.linspace(0.0, 1.0, 20_001)
     w, slope = curve(name, s)

@@ -181,7 +181,7 @@ def test_verdict_agrees_with_samples(interpolation: str) -> None:
             answers.add(answer)
             if answer == "proven":
                 assert least > 0.0
-            if least < lattice_determinant.LEAST_RATIO:
+            if least < lattice_determinant.LEAST_DETERMINANT:
                 assert answer == "folded"
             if answer == "folded":
                 assert least < 0.4  # a fold that samples nearly miss is a shallow one

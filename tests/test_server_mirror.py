@@ -7,7 +7,6 @@ import pytest
 
 from cagefield.edits import Edit
 from cagefield.edits import operations as ops
-from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
 from cagefield.server.editor.mirror import mirror_edit, mirrored_operation
 
@@ -91,6 +90,20 @@ def test_a_lattice_is_mirrored_with_its_points(axis: int) -> None:
     assert np.array_equal(moved.contains(inside), expected.contains(reflected(inside, axis, 0.3)))
 
 
-def test_a_bend_is_not_mirrored() -> None:
-    with pytest.raises(EditError, match="a bend cannot be mirrored"):
-        mirrored_operation(ops.Bend("z", 30.0), 0, INNER.subdivided((1, 1, 3)))
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize(
+    "operation",
+    [
+        ops.Bend("z", 40.0, "x"),
+        ops.Bend("x", -30.0, "y", "end"),
+        ops.Bend("y", 30.0, fixed="middle"),
+        ops.Twist("z", 50.0),
+        ops.Twist("x", 50.0, "middle"),
+        ops.Taper("y", 0.6),
+        ops.Taper("z", 0.6, "end"),
+    ],
+)
+def test_bends_twists_and_tapers_are_mirrored(axis: int, operation: ops.Bend | ops.Twist | ops.Taper) -> None:
+    lattice = INNER.subdivided((2, 2, 3))
+    image = mirrored_operation(operation, axis, lattice).apply(lattice.mirrored(axis, 0.3))
+    np.testing.assert_allclose(image.handles, operation.apply(lattice).mirrored(axis, 0.3).handles, atol=1e-9)

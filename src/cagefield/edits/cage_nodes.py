@@ -15,7 +15,7 @@ from cagefield.geometry.bspline_lattice import INTERPOLATIONS
 from cagefield.geometry.cage import Cage, LatticeCage
 from cagefield.geometry.cage_checks import MOST_POINTS
 from cagefield.geometry.control_points import ControlPoints
-from cagefield.geometry.point_deformers import FALLOFFS
+from cagefield.geometry.point_deformers import FALLOFF_CURVES
 from cagefield.typing import Array
 
 
@@ -46,7 +46,7 @@ def _control_points(node: Node) -> ControlPoints:
     points = [point.vector() for point in keys["points"].items()]
     pivot = keys["pivot"].vector() if "pivot" in keys else None
     linear = [row.vector() for row in keys["linear"].items(3)] if "linear" in keys else None
-    falloff = keys["falloff"].choice(FALLOFFS) if "falloff" in keys else "smooth"
+    falloff = keys["falloff"].choice(FALLOFF_CURVES) if "falloff" in keys else "smooth"
     try:
         return ControlPoints(points, keys["radius"].number(), falloff, pivot=pivot, linear=linear)
     except CagefieldError as error:

@@ -7,7 +7,7 @@ from typing import Any
 from cagefield.edits import operations
 from cagefield.edits.file_nodes import Node
 from cagefield.edits.operations import Operation
-from cagefield.geometry.point_deformers import AXES, FALLOFFS, FIXED
+from cagefield.geometry.point_deformers import FALLOFF_CURVES, FIXED, LATTICE_AXES
 
 MAX_HANDLES = 512
 """Points of any inner cage: lattices have up to 8 along each axis."""
@@ -69,18 +69,20 @@ def parse_operation(node: Node) -> Operation:
         parts = value.mapping(required=("points", "by"), optional=("radius", "falloff"))
         points = tuple(point.integer(0, MAX_HANDLES - 1) for point in parts["points"].items())
         radius = parts["radius"].number() if "radius" in parts else 0.0
-        falloff = parts["falloff"].choice(FALLOFFS) if "falloff" in parts else "smooth"
+        falloff = parts["falloff"].choice(FALLOFF_CURVES) if "falloff" in parts else "smooth"
         return operations.MovePoints(points, parts["by"].vector(), radius, falloff)
     if name == "bend":
         parts = value.mapping(required=("axis", "degrees"), optional=("towards", "fixed"))
-        towards = parts["towards"].choice(AXES) if "towards" in parts else ""
-        return operations.Bend(parts["axis"].choice(AXES), parts["degrees"].number(), towards, _fixed(parts))
+        towards = parts["towards"].choice(LATTICE_AXES) if "towards" in parts else ""
+        return operations.Bend(
+            parts["axis"].choice(LATTICE_AXES), parts["degrees"].number(), towards, _fixed(parts)
+        )
     if name == "twist":
         parts = value.mapping(required=("axis", "degrees"), optional=("fixed",))
-        return operations.Twist(parts["axis"].choice(AXES), parts["degrees"].number(), _fixed(parts))
+        return operations.Twist(parts["axis"].choice(LATTICE_AXES), parts["degrees"].number(), _fixed(parts))
     if name == "taper":
         parts = value.mapping(required=("axis", "factor"), optional=("fixed",))
-        return operations.Taper(parts["axis"].choice(AXES), parts["factor"].number(), _fixed(parts))
+        return operations.Taper(parts["axis"].choice(LATTICE_AXES), parts["factor"].number(), _fixed(parts))
     parts = value.mapping(required=("face", "by"))
     return operations.MoveFace(parts["face"].text(), parts["by"].vector())
 

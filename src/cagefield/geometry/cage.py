@@ -19,9 +19,9 @@ from scipy.spatial.transform import Rotation
 from cagefield.errors import CageError
 from cagefield.geometry import bspline_lattice, hexahedron, point_deformers
 from cagefield.geometry.cage_checks import (
-    are_valid,
     check_lattice,
     check_orientation,
+    check_shear,
     corner_number,
     factors,
     lattice_shape,
@@ -36,7 +36,7 @@ from cagefield.typing import Array, Mask
 
 Axes: TypeAlias = Literal["world", "cage"]
 
-MOST_STATES = 64
+MAX_WAY_STATES = 64
 """Earlier states that a lattice remembers."""
 
 
@@ -235,13 +235,7 @@ class Cage:
     ) -> Cage:
         """The cage sheared about its pivot: `xy` adds xy * y to x, and so on for the other pairs."""
         S = np.array([[1.0, xy, xz], [yx, 1.0, yz], [zx, zy, 1.0]])
-        if not np.isfinite(S).all():
-            raise CageError(f"shear factors must be finite, got {_named_shears(S)}")
-        if np.linalg.det(S) <= 0.0:
-            raise CageError(
-                f"shear must not turn space inside out: {_named_shears(S)} has determinant"
-                f" {np.linalg.det(S):.3g}; use smaller factors"
-            )
+        check_shear(S)
         return self._linear(S, axes, own=True)
 
     def move_corner(self, corner: int, by: ArrayLike) -> Cage:
@@ -312,8 +306,10 @@ class Cage:
 
         A mirrored cage would be inside out, so its corners are numbered the other way along that axis.
         """
-        corners = mirrored_points(self.corners[[self.mirrored_handle(k, axis) for k in range(8)]], axis, at)
-        return Cage(corners, pivot=mirrored_points(self.pivot, axis, at))
+        corners = point_deformers.mirrored(
+            self.corners[[self.mirrored_handle(k, axis) for k in range(8)]], axis, at
+        )
+        return Cage(corners, pivot=point_deformers.mirrored(self.pivot, axis, at))
 
     def mirrored_handle(self, handle: int, axis: int) -> int:
         """The number, in the mirrored cage, of the mirror image of one of the `handles`."""
@@ -371,52 +367,16 @@ class LatticeCage(LatticePoints, Cage):
         object.__setattr__(self, "way", way)
         object.__setattr__(self, "pivot", read_only(place, (3,), "cage pivot"))
         check_lattice(control, counts, interpolation, proven=proven)
-        object.__setattr__(self, "corners", self._hexahedron())
-
-    def _hexahedron(self) -> Array:
-        nx, ny, nz = self.shape
-        x, y, z = (hexahedron.BITS * (nx - 1, ny - 1, nz - 1)).astype(np.intp).T
-        corners = self.control_points[x + nx * (y + ny * z)]
-        if not are_valid(corners[None])[0]:
-            origin, edges = self.frame
-            corners = origin + hexahedron.BITS @ edges.T
-        corners.setflags(write=False)
-        return corners
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, LatticeCage):
-            return NotImplemented
-        return self.has_shape_of(other) and np.array_equal(self.pivot, other.pivot)
-
-    def __hash__(self) -> int:
-        return hash((self.control_points.tobytes(), self.pivot.tobytes(), self.shape, self.interpolation))
-
-    def __repr__(self) -> str:
-        return (
-            f"LatticeCage(points={self.control_points.tolist()}, shape={self.shape},"
-            f' interpolation="{self.interpolation}")'
-        )
-
-    def has_shape_of(self, other: Cage) -> bool:
-        """True where another lattice has the same control points and interpolation."""
-        return (
-            isinstance(other, LatticeCage)
-            and self.shape == other.shape
-            and self.interpolation == other.interpolation
-            and np.array_equal(self.control_points, other.control_points)
-        )
+        object.__setattr__(self, "corners", self.outermost)
 
     def mirrored(self, axis: int, at: float) -> LatticeCage:
         """The lattice across the plane where coordinate `axis` is `at`, numbered the other way along it."""
         order = [self.mirrored_handle(k, axis) for k in range(len(self.handles))]
-        points, pivot = mirrored_points(self.handles[order], axis, at), mirrored_points(self.pivot, axis, at)
+        points, pivot = (
+            point_deformers.mirrored(self.handles[order], axis, at),
+            point_deformers.mirrored(self.pivot, axis, at),
+        )
         return LatticeCage(points, self.shape, self.interpolation, pivot=pivot, proven=True)
-
-    def mirrored_handle(self, handle: int, axis: int) -> int:
-        """The number, in the mirrored lattice, of the mirror image of a control point."""
-        at = list(np.unravel_index(handle, self.shape, order="F"))
-        at[axis] = self.shape[axis] - 1 - at[axis]
-        return int(np.ravel_multi_index(tuple(at), self.shape, order="F"))
 
     def subdivided(self, cells: Iterable[int], interpolation: str = "bspline") -> LatticeCage:
         """The lattice's even grid with other cells; raises `CageError` once points have been moved."""
@@ -427,7 +387,7 @@ class LatticeCage(LatticePoints, Cage):
     def _moved(
         self, points: Array, pivot: Array, *, rigid: bool = False, way: tuple[Array, ...] = ()
     ) -> Cage:
-        way = (*self.way, self.control_points, *way)[-MOST_STATES:]
+        way = (*self.way, self.control_points, *way)[-MAX_WAY_STATES:]
         return LatticeCage(points, self.shape, self.interpolation, pivot=pivot, proven=rigid, way=way)
 
     def _move(self, corners: tuple[int, ...], by: Array) -> Cage:
@@ -438,18 +398,6 @@ class LatticeCage(LatticePoints, Cage):
         return self._moved(self.control_points + weight[:, None] * by, self.pivot)
 
 
-def mirrored_points(points: Array, axis: int, at: float) -> Array:
-    """Points [...,3] across the plane where coordinate `axis` is `at`."""
-    mirrored = points.copy()
-    mirrored[..., axis] = 2.0 * at - mirrored[..., axis]
-    return mirrored
-
-
 def rotation_matrix(theta: ArrayLike) -> Array:
     """R_x R_y R_z [3,3], right-handed, for intrinsic XYZ angles [3] in radians."""
     return np.asarray(Rotation.from_euler("XYZ", np.asarray(theta, dtype=np.float64)).as_matrix())
-
-
-def _named_shears(S: Array) -> str:
-    names = {f"{a}{b}": S[i, j] for i, a in enumerate("xyz") for j, b in enumerate("xyz") if i != j}
-    return ", ".join(f"{name}={value:g}" for name, value in names.items() if value != 0.0)

@@ -165,3 +165,19 @@ def check_orientation(corners: Array) -> None:
         f"cage is inside out at {where}: the Jacobian determinant there is {at_corners[k]:.3g} and must be"
         f" positive; move corner {k} back from the opposite faces"
     )
+
+
+def check_shear(S: Array) -> None:
+    """Raise `CageError` for a shear [3,3] that is not finite or turns space inside out."""
+    if not np.isfinite(S).all():
+        raise CageError(f"shear factors must be finite, got {_named_shears(S)}")
+    if np.linalg.det(S) <= 0.0:
+        raise CageError(
+            f"shear must not turn space inside out: {_named_shears(S)} has determinant"
+            f" {np.linalg.det(S):.3g}; use smaller factors"
+        )
+
+
+def _named_shears(S: Array) -> str:
+    names = {f"{a}{b}": S[i, j] for i, a in enumerate("xyz") for j, b in enumerate("xyz") if i != j}
+    return ", ".join(f"{name}={value:g}" for name, value in names.items() if value != 0.0)

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from cagefield.errors import CageError
 from cagefield.geometry import hexahedron
-from cagefield.geometry.cage import Axes, Cage, mirrored_points
+from cagefield.geometry.cage import Axes, Cage
 from cagefield.geometry.cage_checks import format_vector, read_only
-from cagefield.geometry.point_deformers import FALLOFFS
+from cagefield.geometry.point_deformers import FALLOFF_CURVES, mirrored
 from cagefield.typing import Array, Mask
 
 MAX_CONTROL_POINTS = 256
@@ -31,7 +31,7 @@ class ControlPoints(Cage):
     Parameters
     - points: [n,3] world units, n from 1 to `MAX_CONTROL_POINTS`.
     - radius: reach of each point, world units, > 0.
-    - falloff: one of `FALLOFFS`.
+    - falloff: one of `FALLOFF_CURVES`.
     - pivot: [3], about which `rotate`, `scale` and `shear` turn; the mean of the points if left out.
     - linear: [3,3] with a positive determinant, the linear map that these operations have made of the space
       around the points: distances are measured before it. The identity for new points.
@@ -67,8 +67,8 @@ class ControlPoints(Cage):
     ) -> None:
         p = _points(points)
         r = _radius(radius)
-        if falloff not in FALLOFFS:
-            raise CageError(f'falloff must be one of {", ".join(FALLOFFS)}, got "{falloff!s:.40}"')
+        if falloff not in FALLOFF_CURVES:
+            raise CageError(f'falloff must be one of {", ".join(FALLOFF_CURVES)}, got "{falloff!s:.40}"')
         at = p.mean(axis=0) if pivot is None else pivot
         A = read_only(np.eye(3) if linear is None else linear, (3, 3), "linear map of control points")
         if not np.linalg.det(A) > 0.0:
@@ -143,7 +143,7 @@ class ControlPoints(Cage):
     def mirrored(self, axis: int, at: float) -> ControlPoints:
         """The points across the plane where coordinate `axis` is `at`; their numbers stay."""
         F = np.diag(np.where(np.arange(3) == axis, -1.0, 1.0))
-        points, pivot = mirrored_points(self.points, axis, at), mirrored_points(self.pivot, axis, at)
+        points, pivot = mirrored(self.points, axis, at), mirrored(self.pivot, axis, at)
         return self._moved(points, pivot, linear=F @ self.linear @ F)
 
     def mirrored_handle(self, handle: int, axis: int) -> int:

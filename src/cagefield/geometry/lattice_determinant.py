@@ -22,7 +22,7 @@ from cagefield.typing import Array
 Verdict: TypeAlias = Literal["proven", "folded", "undecided"]
 """Whether a determinant is positive throughout: proven, refuted by a place, or neither after all halvings."""
 
-LEAST_RATIO = 1e-4
+LEAST_DETERMINANT = 1e-4
 """Least determinant, as a share of that of the best affine fit, which counts as positive: rounding of the
 coefficients is below 1e-9."""
 
@@ -119,7 +119,7 @@ def _cell_verdict(
         det = np.moveaxis(np.tensordot(to_bernstein, det, axes=(1, axis)), 0, axis)
     if len(windows) == 2:
         det = det @ to_time.T
-    return _positive(det - LEAST_RATIO, splits)
+    return _positive(det - LEAST_DETERMINANT, splits)
 
 
 def _positive(blocks: Array, splits: list[Array]) -> tuple[Verdict, int]:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from cagefield.errors import CageError
 from cagefield.geometry import bspline_lattice, hexahedron, lattice_determinant, point_deformers
+from cagefield.geometry.cage_checks import are_valid
 from cagefield.typing import Array, Mask
 
 Lattice = TypeVar("Lattice")
@@ -27,6 +28,7 @@ class LatticePoints(ABC, Generic[Lattice]):
     interpolation: str
     way: tuple[Array, ...]
     pivot: Array
+    frame: tuple[Array, Array]
 
     @abstractmethod
     def _moved(
@@ -43,6 +45,47 @@ class LatticePoints(ABC, Generic[Lattice]):
     def handles(self) -> Array:
         """The control points [n,3]."""
         return self.control_points
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, LatticePoints):
+            return NotImplemented
+        return self.has_shape_of(other) and np.array_equal(self.pivot, other.pivot)
+
+    def __hash__(self) -> int:
+        return hash((self.control_points.tobytes(), self.pivot.tobytes(), self.shape, self.interpolation))
+
+    def __repr__(self) -> str:
+        return (
+            f"LatticeCage(points={self.control_points.tolist()}, shape={self.shape},"
+            f' interpolation="{self.interpolation}")'
+        )
+
+    def has_shape_of(self, other: object) -> bool:
+        """True where another lattice has the same control points and interpolation."""
+        return (
+            isinstance(other, LatticePoints)
+            and self.shape == other.shape
+            and self.interpolation == other.interpolation
+            and np.array_equal(self.control_points, other.control_points)
+        )
+
+    def mirrored_handle(self, handle: int, axis: int) -> int:
+        """The number, in the mirrored lattice, of the mirror image of a control point."""
+        at = list(np.unravel_index(handle, self.shape, order="F"))
+        at[axis] = self.shape[axis] - 1 - at[axis]
+        return int(np.ravel_multi_index(tuple(at), self.shape, order="F"))
+
+    @property
+    def outermost(self) -> Array:
+        """The outermost control points [8,3], or where they are no valid hexahedron, `frame`'s corners."""
+        nx, ny, nz = self.shape
+        x, y, z = (hexahedron.BITS * (nx - 1, ny - 1, nz - 1)).astype(np.intp).T
+        corners = self.control_points[x + nx * (y + ny * z)]
+        if not are_valid(corners[None])[0]:
+            origin, edges = self.frame
+            corners = origin + hexahedron.BITS @ edges.T
+        corners.setflags(write=False)
+        return corners
 
     @cached_property
     def affine(self) -> tuple[Array, Array]:

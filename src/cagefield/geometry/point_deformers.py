@@ -12,11 +12,11 @@ import numpy as np
 from cagefield.errors import CageError
 from cagefield.typing import Array
 
-AXES: tuple[str, ...] = ("x", "y", "z")
+LATTICE_AXES: tuple[str, ...] = ("x", "y", "z")
 FIXED: tuple[str, ...] = ("start", "middle", "end")
 """Where along the axis a bend, a twist or a taper leaves the points as they are."""
 
-FALLOFFS: tuple[str, ...] = ("smooth", "sphere", "root", "sharp", "linear")
+FALLOFF_CURVES: tuple[str, ...] = ("smooth", "sphere", "root", "sharp", "linear")
 
 
 def falloff_weight(distance: Array, radius: float, falloff: str) -> Array:
@@ -32,14 +32,14 @@ def falloff_weight(distance: Array, radius: float, falloff: str) -> Array:
         return np.asarray(g * g)
     if falloff == "linear":
         return np.asarray(g)
-    raise CageError(f'falloff must be one of {", ".join(FALLOFFS)}, got "{falloff!s:.40}"')
+    raise CageError(f'falloff must be one of {", ".join(FALLOFF_CURVES)}, got "{falloff!s:.40}"')
 
 
 def axis_number(axis: str, name: str) -> int:
     """The number of an axis "x", "y" or "z", or a `CageError`."""
-    if axis not in AXES:
+    if axis not in LATTICE_AXES:
         raise CageError(f'{name} must be x, y or z, got "{axis!s:.40}"')
-    return AXES.index(axis)
+    return LATTICE_AXES.index(axis)
 
 
 def bend(points: Array, Q: Array, axis: int, towards: int, angle: float, fixed: str) -> Array:
@@ -92,3 +92,10 @@ def _along(points: Array, Q: Array, axis: int, fixed: str) -> tuple[Array, float
     low, high = float(y[:, axis].min()), float(y[:, axis].max())
     start = {"start": low, "middle": 0.5 * (low + high), "end": high}[fixed]
     return y, start, high - low
+
+
+def mirrored(points: Array, axis: int, at: float) -> Array:
+    """Points [...,3] across the plane where coordinate `axis` is `at`."""
+    image = points.copy()
+    image[..., axis] = 2.0 * at - image[..., axis]
+    return image

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.geometry.point_deformers import FALLOFFS
+from cagefield.geometry.point_deformers import FALLOFF_CURVES
 from cagefield.typing import Array
 
 ROOT_END: dict[str, float] = {"sphere": 0.25, "root": 0.0625}
@@ -30,8 +30,8 @@ STEEPEST: dict[str, float] = {"smooth": 1.5, "sphere": 5.17, "root": 5.56, "shar
 
 
 def curve_number(name: str) -> int:
-    """Number of a curve in kernels: its place in `FALLOFFS`."""
-    return FALLOFFS.index(name)
+    """Number of a curve in kernels: its place in `FALLOFF_CURVES`."""
+    return FALLOFF_CURVES.index(name)
 
 
 def curve(name: str, s: Array) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ LEAST_STEPS, MOST_STEPS = 6, 96
 MARGIN = 1.0
 """Width around the lattice, in cells of the grid, in which all moves with it: as far as they interpolate."""
 
-SAMPLES = 32
+MAX_LATTICE_SAMPLES = 32
 """Most samples of a lattice, which its velocity far away is made of."""
 
 SLOPE = 0.75
@@ -112,8 +112,9 @@ class LatticeFlow:
         P = np.stack([bspline_lattice.padded(net, piece.shape) for net in nets])
         n = self.cells + 1
         out = np.empty((n, n, n, 3), dtype=np.float32)
-        linear, weight = piece.interpolation == "linear", falloff_numbers(self.falloff)
-        fill_slice(places, reach, dz, frame, samples, P, linear, blur, margin, weight, out.reshape(-1, 3))
+        linear = piece.interpolation == "linear"
+        settings = np.array([blur, margin, *falloff_numbers(self.falloff)])
+        fill_slice(places, reach, dz, frame, samples, P, linear, settings, out.reshape(-1, 3))
         return out
 
     @cached_property
@@ -153,9 +154,9 @@ def sampled(piece: Piece, s: float) -> tuple[Array, Float32, float]:
 
 
 def sample_counts(shape: tuple[int, int, int]) -> tuple[int, int, int]:
-    """Samples along each axis, two a cell, `SAMPLES` in all at most."""
+    """Samples along each axis, two a cell, `MAX_LATTICE_SAMPLES` in all at most."""
     counts = np.minimum(2 * (np.array(shape) - 1), 10)
-    while counts.prod() > SAMPLES:
+    while counts.prod() > MAX_LATTICE_SAMPLES:
         counts[np.argmax(counts)] -= 1
     return int(counts[0]), int(counts[1]), int(counts[2])
 

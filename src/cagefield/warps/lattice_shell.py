@@ -111,18 +111,18 @@ class LatticeShell:
         origin, frame = self.outer.frame
         padded = np.zeros((*flow.velocities.shape[:-1], 4), dtype=np.float32)
         padded[..., :3] = flow.velocities
+        confines, heights = flow.confines, flow.confines.heights
+        frames = [confines.center[None], confines.inverse, confines.frame, heights[None], b[None]]
+        frames += [np.linalg.inv(A), A, origin[None], frame]
         sample_nodes(
             padded.reshape(-1),
             np.uintp(flow.cells + 1),
             flow.steps,
-            np.concatenate([flow.confines.center[None], flow.confines.inverse, flow.confines.frame]),
-            flow.confines.heights,
-            np.concatenate([b[None], np.linalg.inv(A), A]),
+            np.concatenate(frames),
             around.padded,
             self.deformed.interpolation == "linear",
             around.face_table,
             1.5 * around.largest + 1e-9,
-            np.concatenate([origin[None], frame]),
             resolution,
             out,
         )

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cagefield.geometry import bspline_lattice, lattice_determinant
-from cagefield.geometry.cage import MOST_STATES, LatticeCage
+from cagefield.geometry.cage import MAX_WAY_STATES, LatticeCage
 from cagefield.typing import Array
 
 MOST_TURN = 1.6
@@ -121,6 +121,6 @@ def _states(inner: LatticeCage, deformed: LatticeCage) -> list[Array]:
             way = way[n + 1 :]
             break
     else:
-        if len(way) < MOST_STATES:  # not made from this inner cage
+        if len(way) < MAX_WAY_STATES:  # not made from this inner cage
             way = []
     return [inner.control_points, *way, deformed.control_points]

@@ -15,7 +15,6 @@ from scipy.spatial.transform import Rotation
 from cagefield.edits import Edit
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation, Triple
-from cagefield.errors import EditError
 from cagefield.geometry.cage import FACES, Cage
 from cagefield.typing import Array
 
@@ -48,7 +47,7 @@ def mirrored_operation(operation: Operation, axis: int, cage: Cage) -> Operation
         values = {pair: -value if name in pair and value else value for pair, value in factors}
         return ops.Shear(**values, axes=operation.axes)
     if isinstance(operation, ops.Bend | ops.Twist | ops.Taper):
-        raise EditError(f"a {operation.noun} cannot be mirrored; move the lattice's points instead")
+        return _mirrored_along_axis(operation, "xyz"[axis])
     by = _flipped(operation.by, axis)
     if isinstance(operation, ops.MoveCorner):
         return ops.MoveCorner(operation.corner ^ 1 << axis, by)
@@ -63,6 +62,21 @@ def mirrored_operation(operation: Operation, axis: int, cage: Cage) -> Operation
     if isinstance(operation, ops.MoveFace):
         return ops.MoveFace(_other_face(operation.face, axis), by)
     return ops.MoveCorners(tuple(k ^ 1 << axis for k in operation.corners), by)
+
+
+def _mirrored_along_axis(operation: ops.Bend | ops.Twist | ops.Taper, mirrored: str) -> Operation:
+    """A bend, twist or taper of a lattice whose own axis `mirrored` is numbered the other way."""
+    ends = {"start": "end", "middle": "middle", "end": "start"}
+    fixed = ends[operation.fixed] if operation.axis == mirrored else operation.fixed
+    if isinstance(operation, ops.Twist):
+        return replace(operation, degrees=-operation.degrees, fixed=fixed)
+    if isinstance(operation, ops.Taper):
+        factor = 1.0 / operation.factor if operation.axis == mirrored else operation.factor
+        return replace(operation, factor=factor, fixed=fixed)
+    towards = operation.towards or "yzx"["xyz".index(operation.axis)]
+    return replace(
+        operation, degrees=-operation.degrees if towards == mirrored else operation.degrees, fixed=fixed
+    )
 
 
 def _other_face(face: str, axis: int) -> str:

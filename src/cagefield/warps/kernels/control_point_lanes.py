@@ -25,7 +25,7 @@ _HALF_POWER = DISTANCE_POWER // 2
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def _weigh(number: int, s: Array) -> None:
-    """Put the weights of a curve in the place of s [LANES] in [0,1]; numbers as in `FALLOFFS`."""
+    """Put the weights of a curve in the place of s [LANES] in [0,1]; numbers as in `FALLOFF_CURVES`."""
     if number == 0:
         for i in range(LANES):
             s[i] = s[i] * s[i] * (3.0 - 2.0 * s[i])

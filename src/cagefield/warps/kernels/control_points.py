@@ -36,7 +36,7 @@ def _bounded_root(q: float, end: float) -> tuple[float, float]:
 
 @njit(cache=True, fastmath=True, error_model="numpy", inline="always")
 def _curve(number: int, s: float) -> tuple[float, float]:
-    """(weight, slope) at 0 < s <= 1; numbers as in `FALLOFFS`."""
+    """(weight, slope) at 0 < s <= 1; numbers as in `FALLOFF_CURVES`."""
     if number == 0:
         return s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s)
     if number == 1:

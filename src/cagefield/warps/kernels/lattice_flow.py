@@ -238,9 +238,9 @@ def _meet_lattice(P, linear, margin, near, work):
 
 
 @njit(**FAST)
-def _fill_batch(places, reach, dz, frame, samples, P, linear, blur, margin, falloff, out, first, local, work):
+def _fill_batch(places, reach, dz, frame, samples, P, linear, settings, out, first, local, work):
     """`fill_slice` at up to 256 nodes from `first`."""
-    count = samples.shape[1]
+    count, blur, margin = samples.shape[1], settings[0], settings[1]
     stride = min(len(dz) - 1, 1)
     for n in range(first, min(first + 256, len(places))):
         if reach[n] < 0.0:
@@ -293,7 +293,7 @@ def _fill_batch(places, reach, dz, frame, samples, P, linear, blur, margin, fall
         if near[9] < 2.5 * margin:
             _meet_lattice(P, linear, margin, near, work)
         far = 1.0 / reach[n]
-        w = fade(max(near[9] - min(margin, 0.5 * far), 0.0) * reach[n], falloff[0], falloff[1], falloff[2])
+        w = fade(max(near[9] - min(margin, 0.5 * far), 0.0) * reach[n], settings[2], settings[3], settings[4])
         r0, r1, r2 = near[6], near[7], near[8]
         m = n * stride
         for i in range(3):
@@ -306,19 +306,19 @@ def _fill_batch(places, reach, dz, frame, samples, P, linear, blur, margin, fall
 
 
 @njit(parallel=True, **FAST)
-def fill_slice(places, reach, dz, frame, samples, P, linear, blur, margin, falloff, out):
+def fill_slice(places, reach, dz, frame, samples, P, linear, settings, out):
     """Writes dz/ds [G^3,3] of one slice, float32.
 
     places [N,3] of the nodes in the world; reach [N], their 1 / d_o, -1 where nothing moves; dz [N or 1,3,3],
     dz/dx; frame [11,3]: c, dc/ds, F^-1, dF/ds, F; samples [30,M] of the lattice: y, u, lengths of dx/du,
     (dy/du)^-1, velocity in the frame and its slope in u; P [2,nz+2,ny+2,nx+2,3], padded control points in
-    the frame and their velocities; blur, a squared length; margin, a length; falloff [3]: a, b, width.
+    the frame and their velocities; settings [5]: blur, a squared length; margin, a length; a, b and width of
+    the falloff.
     """
     batches = (len(places) + 255) // 256
     local, work = np.empty((batches, 10)), np.empty((batches, 11, 9))
     for part_ in prange(batches):
         part = np.intp(part_)
         _fill_batch(
-            places, reach, dz, frame, samples, P, linear, blur, margin, falloff, out,
-            256 * part, local[part], work[part],
-        )  # fmt: skip
+            places, reach, dz, frame, samples, P, linear, settings, out, 256 * part, local[part], work[part]
+        )

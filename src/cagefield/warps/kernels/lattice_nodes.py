@@ -111,10 +111,9 @@ def _affine(rows, x, y):
 
 
 @njit(**FAST)
-def _sample_batch(
-    grid, nodes, steps, confines, heights, material, P, linear, table, near, place, resolution, out, first
-):
+def _sample_batch(grid, nodes, steps, frames, P, linear, table, near, resolution, out, first):
     """`sample_nodes` at nodes from `first`."""
+    confines, heights, material, place = frames[0:7], frames[7], frames[8:15], frames[15:19]
     work, x, X, u = np.empty((11, 9)), np.empty(3), np.empty(3), np.empty(3)
     z, v = np.zeros((NODES_PER_BATCH, 4), np.float32), np.empty((NODES_PER_BATCH, 4), np.float32)
     enough = 1e-5 * (abs(place[1, 0]) + abs(place[2, 1]) + abs(place[3, 2]))
@@ -157,20 +156,16 @@ def _sample_batch(
 
 
 @njit(parallel=True, **FAST)
-def sample_nodes(
-    grid, nodes, steps, confines, heights, material, P, linear, table, near, place, resolution, out
-):
+def sample_nodes(grid, nodes, steps, frames, P, linear, table, near, resolution, out):
     """Writes the displacements to canonical space [R^3,3] of the nodes of an outer cage with parallel faces.
 
     grid [K N^3 4] float32, nodes N, steps [K]: velocities (x fastest, padded to 4) and steps of the flow;
-    confines [7,3]: centre, dz/dx, dx/dz of the outer cage; heights [3] of its faces over the centre; material
-    [7,3]: origin, du/dx, dx/du of the canonical lattice; P: padded deformed control points; table: r on the
-    faces; near: distance from the canonical cage after the flow up to which a node may be inside; place
-    [4,3]: origin and edges of the nodes' box.
+    frames [19,3]: centre, dz/dx, dx/dz of the outer cage, heights of its faces over the centre, then origin,
+    du/dx, dx/du of the canonical lattice, then origin and edges of the nodes' box; P: padded deformed control
+    points; table: r on the faces; near: distance from the canonical cage after the flow up to which a node
+    may be inside.
     """
     count = resolution**3
     for part in prange((count + NODES_PER_BATCH - 1) // NODES_PER_BATCH):
-        _sample_batch(
-            grid, nodes, steps, confines, heights, material, P, linear, table, near, place, resolution, out,
-            np.intp(part) * NODES_PER_BATCH,
-        )  # fmt: skip
+        first = np.intp(part) * NODES_PER_BATCH
+        _sample_batch(grid, nodes, steps, frames, P, linear, table, near, resolution, out, first)
