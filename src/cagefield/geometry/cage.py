@@ -326,7 +326,7 @@ class Cage:
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class LatticeCage(LatticePoints, Cage):
+class LatticeCage(LatticePoints["LatticeCage"], Cage):
     """A cage of 2 to 8 control points along each axis; its inside is their spline, see `bspline_lattice`.
 
     "bspline" is twice continuously differentiable throughout; "linear" is continuous, with kinks between the
@@ -386,7 +386,7 @@ class LatticeCage(LatticePoints, Cage):
 
     def _moved(
         self, points: Array, pivot: Array, *, rigid: bool = False, way: tuple[Array, ...] = ()
-    ) -> Cage:
+    ) -> LatticeCage:
         way = (*self.way, self.control_points, *way)[-MAX_WAY_STATES:]
         return LatticeCage(points, self.shape, self.interpolation, pivot=pivot, proven=rigid, way=way)
 

@@ -151,7 +151,7 @@ def _bernstein(degree: int) -> tuple[Array, Array, Array]:
     binomials = np.array([comb(degree, int(k)) for k in n], dtype=np.float64)
     basis = binomials * nodes[:, None] ** n * (1.0 - nodes[:, None]) ** (degree - n)
     left = np.array([[comb(i, j) / 2.0**i if j <= i else 0.0 for j in n] for i in n])
-    return nodes, np.linalg.inv(basis), np.stack([left, left[::-1, ::-1]])
+    return nodes, np.asarray(np.linalg.inv(basis), dtype=np.float64), np.stack([left, left[::-1, ::-1]])
 
 
 def least_determinant(points: Array, shape: tuple[int, int, int], interpolation: str) -> tuple[float, Array]:

@@ -103,7 +103,7 @@ class LatticePoints(ABC, Generic[Lattice]):
         """(u [N,3], inside [N]) of points [N,3]: u in [0,1]^3 where inside, else unspecified."""
         p = np.asarray(points, dtype=np.float64)
         u, mask = np.full(p.shape, np.nan), np.zeros(len(p), dtype=bool)
-        low, high = self.aabb
+        low, high = self.control_points.min(axis=0), self.control_points.max(axis=0)
         slack = 1e-9 * (high - low)
         near = np.flatnonzero(hexahedron.all_three((p >= low - slack) & (p <= high + slack)))
         u[near], mask[near] = bspline_lattice.inverse(

@@ -112,13 +112,13 @@ class LatticeShell:
         padded = np.zeros((*flow.velocities.shape[:-1], 4), dtype=np.float32)
         padded[..., :3] = flow.velocities
         confines, heights = flow.confines, flow.confines.heights
-        frames = [confines.center[None], confines.inverse, confines.frame, heights[None], b[None]]
-        frames += [np.linalg.inv(A), A, origin[None], frame]
+        outer = (confines.center[None], confines.inverse, confines.frame, heights[None])
+        frames = np.concatenate([*outer, b[None], np.linalg.inv(A), A, origin[None], frame])
         sample_nodes(
             padded.reshape(-1),
             np.uintp(flow.cells + 1),
             flow.steps,
-            np.concatenate(frames),
+            frames,
             around.padded,
             self.deformed.interpolation == "linear",
             around.face_table,
@@ -292,12 +292,12 @@ class Surroundings:
                 face = u[2 * axis + side]
                 face[:, axis], face[:, (axis + 1) % 3], face[:, (axis + 2) % 3] = side, b, c
         A, b = self.inner.affine
-        u = u.reshape(-1, 3)
+        on_faces = u.reshape(-1, 3)
         z, _ = self.flow.through(
-            self._in_outer(self.lattice(u)[0]), backwards=True, slopes=False, enough=1e-6
+            self._in_outer(self.lattice(on_faces)[0]), backwards=True, slopes=False, enough=1e-6
         )
         back = hexahedron.points(self.flow.outer.corners, 0.5 * (z + 1.0))
-        return np.asarray((back - (b + u @ A.T)).reshape(6, n, n, 3))
+        return np.asarray((back - (b + on_faces @ A.T)).reshape(6, n, n, 3))
 
     @cached_property
     def _samples(self) -> tuple[Array, Array, Array]:
