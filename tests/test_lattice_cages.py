@@ -285,7 +285,7 @@ def test_files_give_back_the_stack() -> None:
     turned = Edit.continuous(CUBE.rotate((0.1, 0.2, 0.3)), outer).translate((0.1, 0, 0))
     stack = EditStack([edit, linear, turned])
     for form in ("yaml", "json"):
-        assert parse_edits(dump_edits(stack, format=form), format=form) == stack
+        assert parse_edits(dump_edits(stack, format=form), format=form, check=False) == stack
     text = dump_edits(EditStack([edit]))
     assert "lattice: {points: [2, 2, 5], interpolation: bspline}" in text and "degrees: 60.0" in text
 
@@ -302,7 +302,7 @@ def test_file_by_hand() -> None:
         "{points: [2, 2, 5]}",
         "{bend: {axis: z, degrees: 30}}, {twist: {axis: z, degrees: 20}}",
     )
-    (edit,) = parse_edits(text)
+    (edit,) = parse_edits(text, check=False)
     assert edit.inner == ARM and edit.operations == (Bend("z", 30.0), Twist("z", 20.0))
 
 
@@ -327,4 +327,4 @@ def test_file_by_hand() -> None:
 )
 def test_file_errors(lattice: str, operation: str, message: str) -> None:
     with pytest.raises(EditFileError, match=message):
-        parse_edits(LATTICE % (lattice, operation))
+        parse_edits(LATTICE % (lattice, operation), check=False)
