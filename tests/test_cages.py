@@ -7,7 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.errors import CageError
 from cagefield.geometry import hexahedron, hexahedron_determinant
-from cagefield.geometry.cage import Cage, outside_by
+from cagefield.geometry.cage import Cage
+from cagefield.geometry.face_distance import outside_by
 from random_cages import cages, examples, seeds
 
 

@@ -42,6 +42,12 @@ EDITS = {
     "bent outer": [Edit.continuous(INNER, BENT).rotate((0.0, 0.4, 0.4)).move_corner(0, (0.1, 0.1, 0.1))],
     "trilinear": [Edit.continuous(INNER, OUTER, shell=Trilinear()).translate((0.1, 0.1, 0.0))],
     "lattice": [Edit.continuous(INNER, OUTER, lattice=16).rotate((0.0, 0.0, 0.5))],
+    "points": [Edit.points([[0, 0, 0]], radius=0.5).translate((0.3, 0.1, 0.0)).rotate((0, 0, 1.0))],
+    "points apart": [
+        Edit.points([[0.1, 0, 0], [-0.2, 0.2, 0]], radius=0.4, falloff="root")
+        .move_point(0, (0.1, -0.1, 0.1))
+        .move_point(1, (-0.1, 0.1, 0))
+    ],
     "move": [Edit.move(INNER).translate((0.5, 0.0, 0.0)).rotate((0, 0, 0.5))],
     "bent move": [Edit.move(INNER).move_corner(7, (0.4, 0.3, 0.2))],
     "copy": [Edit.copy(INNER).translate((0.4, 0.0, 0.0))],

@@ -44,7 +44,10 @@ edits:
 
 def test_the_example_in_the_docstring_is_an_edit_file() -> None:
     text = textwrap.dedent((edit_files.__doc__ or "").split("\n\n")[1])
-    first, second, third = parse_edits(text)
+    first, second, third, fourth = parse_edits(text)
+    assert fourth == Edit.points([[0, 0, 1]], radius=0.5, name="nose").move_point(0, (0, 0.3, 0)).move_points(
+        [0], (0, 0.1, 0)
+    )
     assert third == Edit.paste("../microphone", Cage.box((0, 0, 0), 2), name="microphone")
     assert first.name == "arm up" and first.lattice == 64 and len(first.operations) == 8
     assert isinstance(second, Delete) and second.inner == Cage.box((2, 0, 0), 0.5)

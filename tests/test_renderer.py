@@ -105,6 +105,9 @@ EDITS = {
             .translate((0.1, 0.05, 0.1))
         ]
     ),
+    "points": EditStack(
+        [Edit.points([[0, 0, 0.1]], radius=0.9, lattice=24).translate((0.3, -0.2, 0.3)).rotate((0, 0, 0.8))]
+    ),
     # Samples that the second edit moves land in the box of the first, which their ray does not meet.
     "lattices that overlap": EditStack(
         [

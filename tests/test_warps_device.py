@@ -84,10 +84,26 @@ STACKS = {
     "move bent": [Edit.move(BENT).translate((0.4, 0, 0)).move_face("+x", (0.1, 0.1, 0))],
     "copy": [Edit.copy(INNER).translate((0.2, 0, 0)).shear(xy=0.5)],
     "delete": [Edit.delete(BENT)],
+    "points": [
+        Edit.points([[0, 0, 0], [0.3, 0.1, 0]], radius=0.5, lattice=33)
+        .translate((0.2, 0.1, 0))
+        .rotate((0, 0, 0.5))
+    ],
+    "points in a bent outer cage": [
+        Edit.points([[0, 0, 0]], radius=0.5, outer=OUTER.move_corner(3, (-0.2, -0.1, 0.1)), lattice=20)
+        .translate((0.1, 0, 0.1))
+        .rotate((0, 0, 0.5))
+    ],
     "nothing": [Edit.continuous(INNER, OUTER, shell=Trilinear())],
     "empty": [],
 }
-STACKS["chain"] = [*STACKS["deformed"], *STACKS["move bent"], *STACKS["affine"], *STACKS["delete"]]
+STACKS["chain"] = [
+    *STACKS["deformed"],
+    *STACKS["points"],
+    *STACKS["move bent"],
+    *STACKS["affine"],
+    *STACKS["delete"],
+]
 
 
 @pytest.mark.parametrize("name", STACKS)
@@ -188,3 +204,20 @@ def test_lattices_are_kept_with_their_edit(monkeypatch: pytest.MonkeyPatch) -> N
     assert not sampled
     DeviceStack.from_stack(EditStack([edit.translate((0.01, 0, 0))]))
     assert len(sampled) == 1
+
+
+def test_kernels_show_control_points_without_a_lattice_by_one_of_64() -> None:
+    from cagefield.edits.device_stack import DeviceStack
+
+    (edit,) = STACKS["points"]
+    exact, fine = edit.without_lattice(), edit.replace(lattice=64)
+    assert exact.kernel_lattice == 64 and exact.lattice is None
+    p, d = samples(2000)
+    one, other = (DeviceStack.from_stack(EditStack([edit])).to_canonical(p, d) for edit in (exact, fine))
+    for values, expected in zip(one, other, strict=True):
+        np.testing.assert_array_equal(values, expected)
+    # It is off by what is measured, and the reference of the edit without one by nothing.
+    worst, mean = exact.lattice_error()
+    points = DeviceStack.from_stack(EditStack([exact])).to_canonical(p, d)[0]
+    error = np.linalg.norm(points - EditStack([exact]).to_canonical(p).points, axis=1)
+    assert 0.0 < error.max() < 1.5 * worst + 1e-5 and mean < 1e-3

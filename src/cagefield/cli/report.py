@@ -70,7 +70,8 @@ def _title(edit: Edit) -> str:
     elif isinstance(edit, Paste):
         kind = f"paste from {edit.source}"
     elif isinstance(edit, Continuous):
-        how = "exact" if edit.lattice is None else f"lattice of {edit.lattice}^3 nodes"
+        nodes = edit.kernel_lattice
+        how = "exact" if nodes is None else f"lattice of {nodes}^3 nodes"
         kind = f"continuous, {edit.shell.name} shell, {how}"
     else:
         kind = "discrete copy" if isinstance(edit, Copy) else "discrete move"
@@ -102,11 +103,13 @@ def _details(edit: Edit, content: _Content) -> Iterable[str]:
     if not edit.changes_anything:
         yield "changes nothing: the inner cage is where it was"
         return
-    reach = np.linalg.norm(edit.deformed.corners - edit.inner.corners, axis=1).max()
+    reach = np.linalg.norm(edit.deformed.handles - edit.inner.handles, axis=1).max()
+    handles = "corners" if edit.inner.is_hexahedron else "points"
     growth = _volume(edit.deformed) / _volume(edit.inner)
+    volume = f"; its volume becomes {growth:.3g} times what it was" if edit.inner.is_hexahedron else ""
     yield (
-        f"{share:.1%} of the field's {content.noun} follow the cage, whose corners move by up to "
-        f"{reach:.4g}; its volume becomes {growth:.3g} times what it was"
+        f"{share:.1%} of the field's {content.noun} follow the cage, whose {handles} move by up to "
+        f"{reach:.4g}{volume}"
     )
     try:
         warp = edit.exact_warp
@@ -118,7 +121,7 @@ def _details(edit: Edit, content: _Content) -> Iterable[str]:
         ratio = warp.shell.least_ratio()
         state = "does not fold" if ratio > 0.0 else "folds, and is allowed to"
         yield f"{gives:.1%} of them give way; the shell {state} (least volume ratio {ratio:.3f})"
-        if isinstance(edit, Continuous) and edit.lattice is not None:
+        if isinstance(edit, Continuous) and edit.kernel_lattice is not None:
             worst, mean = edit.lattice_error()
             mean, worst = mean / content.length, worst / content.length
             yield f"the lattice is off by {mean:.2g} {content.lengths} on average, {worst:.2g} at most"

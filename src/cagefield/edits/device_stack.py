@@ -129,7 +129,7 @@ def _packed(step: PreparedEdit) -> NDArray[np.float32]:
     edit = step.edit
     if isinstance(edit, Paste) and step.part is None:
         raise edit.unread()
-    lattice = edit.lattice if isinstance(edit, Continuous) else None
+    lattice = edit.kernel_lattice if isinstance(edit, Continuous) else None
     return pack_warp(step.exact_warp, step.boxes, lattice)
 
 
@@ -137,7 +137,7 @@ def _nodes_of(edit: Edit) -> NDArray[np.float32]:
     """Nodes [R^3,3] of an edit's lattice, or the table [T,3] of its exact flow shell; [0,3] without."""
     if not isinstance(edit, Continuous):
         return np.zeros((0, 3), dtype=np.float32)
-    return _flow_table(edit) if edit.lattice is None else edit.lattice_nodes
+    return _flow_table(edit) if edit.kernel_lattice is None else edit.lattice_nodes
 
 
 @memoized_weakly

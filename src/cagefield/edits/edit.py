@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
@@ -36,14 +36,28 @@ from cagefield.edits.shells import (
     problem_of_unused_falloff,
 )
 from cagefield.errors import CageError, DeviceError, EditError
-from cagefield.geometry.cage import Axes, Cage, outside_by
+from cagefield.geometry.cage import Axes, Cage
 from cagefield.geometry.cage_checks import format_vector
+from cagefield.geometry.control_points import ControlPoints
+from cagefield.geometry.face_distance import outside_by
+from cagefield.geometry.reach_cage import ReachCage
 from cagefield.typing import Array, Float32
-from cagefield.warps import FlowShell, Shell, Warp
+from cagefield.warps import (
+    FlowShell,
+    FreeFormFlow,
+    LatticeShell,
+    Shell,
+    Warp,
+    inner_map_between,
+    reach_between,
+)
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.hexahedron_map import HexahedronMap
 from cagefield.warps.lattice import Lattice
+
+FREE_FORM_LATTICE = 64
+"""Nodes per axis with which kernels show an inner cage that is no hexahedron, where nothing else is said."""
 
 CHUNK_POINTS = 500
 """Points at which a lattice is compared with the exact map at a time: hundredths of a second."""
@@ -128,6 +142,24 @@ class Edit(ABC):
         return Continuous(inner, outer, shell=shell, lattice=lattice, name=name, **options)
 
     @staticmethod
+    def points(
+        points: ArrayLike,
+        *,
+        radius: float,
+        falloff: str = "smooth",
+        outer: Cage | None = None,
+        name: str = "",
+        **options: Any,
+    ) -> Continuous:
+        """Edit of control points [n,3], with which everything within the radius follows, less and less.
+
+        `falloff` is one of smooth, sphere, root, sharp, linear; see `ControlPoints`. Without an outer cage
+        nothing else confines it. `options` are those of `continuous`.
+        """
+        cage = ControlPoints(points, radius, falloff)
+        return Continuous(cage, outer, name=name, **options)  # type: ignore[arg-type]
+
+    @staticmethod
     def move(cage: Cage, *, name: str = "", **options: Any) -> Move:
         """Edit that takes the content of a cage away and shows it elsewhere; see `Move`."""
         return Move(cage, name=name, **options)
@@ -190,6 +222,34 @@ class Edit(ABC):
     def move_face(self: AnyEdit, face: str, by: ArrayLike) -> AnyEdit:
         """The edit with a face of its inner cage, such as "+x", moved by a vector [3]."""
         return self.then(ops.MoveFace(face, ops.displacement(by, "move_face")))
+
+    def move_point(self: AnyEdit, point: int, by: ArrayLike) -> AnyEdit:
+        """The edit with one control point of its inner cage, numbered x fastest, moved by a vector [3]."""
+        return self.then(ops.MovePoint(point, ops.displacement(by, "move_point")))
+
+    def move_points(
+        self: AnyEdit,
+        points: Iterable[int],
+        by: ArrayLike,
+        *,
+        radius: float = 0.0,
+        falloff: str = "smooth",
+    ) -> AnyEdit:
+        """The edit with control points moved by a vector [3]; see `operations.MovePoints`."""
+        by = ops.displacement(by, "move_points")
+        return self.then(ops.MovePoints(tuple(points), by, radius, falloff))
+
+    def bend(self: AnyEdit, axis: str, angle: float, *, towards: str = "", fixed: str = "start") -> AnyEdit:
+        """The edit with its lattice bent along an axis by an angle in radians; see `operations.Bend`."""
+        return self.then(ops.Bend(axis, ops.degrees(angle), towards, fixed))
+
+    def twist(self: AnyEdit, axis: str, angle: float, *, fixed: str = "start") -> AnyEdit:
+        """The edit with its lattice twisted about an axis by an angle in radians; see `operations.Twist`."""
+        return self.then(ops.Twist(axis, ops.degrees(angle), fixed))
+
+    def taper(self: AnyEdit, axis: str, factor: float, *, fixed: str = "start") -> AnyEdit:
+        """The edit with its lattice scaled across an axis to a factor at its end; see `operations.Taper`."""
+        return self.then(ops.Taper(axis, float(factor), fixed))
 
     def then(self: AnyEdit, operation: Operation) -> AnyEdit:
         """The edit with one more operation."""
@@ -289,7 +349,7 @@ class Edit(ABC):
 
     @cached_property
     def _is_moved(self) -> bool:
-        return not np.array_equal(self.inner.corners, self.deformed.corners)
+        return not self.inner.has_shape_of(self.deformed)
 
 
 @dataclass(frozen=True)
@@ -297,7 +357,8 @@ class Continuous(Edit):
     """Edit whose shell, between the inner and the outer cage, is interpolated: the field stays connected.
 
     Parameters, besides those of `Edit`
-    - outer: the outer cage V^o, which confines the edit.
+    - outer: the outer cage V^o, which confines the edit. None for control points takes the box around all
+      that they reach on their way, a `ReachCage`.
     - shell: kind of the map between the cages, `Flow` (cannot fold) or `Trilinear` (the paper's).
     - lattice: None evaluates the shell exactly at every sample; an integer R interpolates it from R^3 nodes
       (64, 128 or 256 in the paper). The inner region is exact either way.
@@ -312,15 +373,24 @@ class Continuous(Edit):
     allow_folding: bool = False
 
     def __post_init__(self) -> None:
+        if not isinstance(self.shell, ShellKind):
+            self._refuse(f"shell must be Flow(...) or Trilinear(), got {self.shell!r:.60}")
+        self._refuse(self.shell.problem_of_inner(self.inner))
+        self._refuse(problem_of_lattice(self.lattice))
+        super().__post_init__()
+        if self.outer is None or isinstance(self.outer, ReachCage):
+            object.__setattr__(self, "outer", self._reach)
         if not isinstance(self.outer, Cage):
             self._refuse(
                 "a continuous edit needs an outer cage; give one (inner.grown(margin), say) or make the"
                 " edit discrete"
             )
-        if not isinstance(self.shell, ShellKind):
-            self._refuse(f"shell must be Flow(...) or Trilinear(), got {self.shell!r:.60}")
-        self._refuse(problem_of_lattice(self.lattice))
-        super().__post_init__()
+
+    @property
+    def _reach(self) -> ReachCage | None:
+        """The outer cage where none is given."""
+        reach = reach_between(self.inner, self.deformed)
+        return None if reach is None else ReachCage.around(reach)
 
     @property
     def shell_settings(self) -> ShellSettings:
@@ -345,7 +415,8 @@ class Continuous(Edit):
     @cached_property
     def exact_warp(self) -> ContinuousWarp:
         self.check()
-        return ContinuousWarp(HexahedronMap(self.inner, self.deformed), self.outer, self._last_shell)
+        inner = inner_map_between(self.inner, self.deformed)
+        return ContinuousWarp(inner, self.outer, self._last_shell)
 
     @cached_property
     def warp(self) -> ContinuousWarp:
@@ -357,11 +428,22 @@ class Continuous(Edit):
         exact = self.exact_warp
         if self.lattice is None:
             return exact
-        if isinstance(exact.shell, FlowShell):
+        if isinstance(exact.shell, FlowShell | FreeFormFlow | LatticeShell):
             with suppress(DeviceError):
                 return replace(exact, lattice=self._kernel_lattice)
         lattice = Lattice.sample(lambda p: exact.to_canonical(p).points, exact.outer, self.lattice)
         return replace(exact, lattice=lattice)
+
+    @property
+    def kernel_lattice(self) -> int | None:
+        """Nodes per axis from which kernels interpolate the map; None where they evaluate it exactly.
+
+        Kernels have no exact map of an inner cage that is no hexahedron: it has
+        `FREE_FORM_LATTICE` of them without a `lattice`.
+        """
+        if self.lattice is None and not self.inner.is_hexahedron:
+            return FREE_FORM_LATTICE
+        return self.lattice
 
     @property
     def lattice_nodes(self) -> Float32:
@@ -376,7 +458,7 @@ class Continuous(Edit):
     def _kernel_lattice(self) -> Lattice:
         """The lattice as the renderer has it, for the float64 reference. Raises as `lattice_nodes` does."""
         origin, frame = self.outer.frame
-        grid = self.lattice_nodes.reshape(*3 * (self.lattice or 0,), 3)
+        grid = self.lattice_nodes.reshape(*3 * (self.kernel_lattice or 0,), 3)
         return Lattice(origin, frame, grid.astype(np.float64))
 
     def check(self) -> None:
@@ -412,7 +494,7 @@ class Continuous(Edit):
         interpolation's error falls with R^-2 where the map is smooth and with R^-1 at the cages' faces.
         `proceed` is called now and then, and gives the measurement up by raising.
         """
-        warp, nodes = self.exact_warp, resolution if resolution is not None else self.lattice
+        warp, nodes = self.exact_warp, resolution if resolution is not None else self.kernel_lattice
         if nodes is None:
             return 0.0, 0.0
         # The kernel's, which takes no time: float32's rounding is far below the lattice's error.
@@ -434,7 +516,7 @@ class Continuous(Edit):
             except CageError:
                 return False
 
-        if isinstance(self.shell, Flow):
+        if isinstance(self.shell, Flow) and self.inner.is_hexahedron:
             if is_safe(1.0):
                 return 1.0
             for fine in (False, True):
@@ -465,18 +547,24 @@ class Continuous(Edit):
 
     def _fault(self, deformed: Cage) -> tuple[str, str]:
         """(fault, cure) with the inner cage at a `deformed` that is not safe."""
-        outside = np.flatnonzero(~self.outer.contains(deformed.corners))
+        handles = deformed.handles
+        has_corners = self.inner.is_hexahedron
+        outside = np.flatnonzero(~self.outer.contains(handles))
         if len(outside):
             face, distance, k = max(
-                ((*outside_by(self.outer, deformed.corners[k]), int(k)) for k in outside),
+                ((*outside_by(self.outer, handles[k]), int(k)) for k in outside),
                 key=lambda item: item[1],
             )
             return (
-                f"outer cage must contain the inner cage: inner corner {k} at"
-                f" {format_vector(deformed.corners[k])} is {distance:.3g} outside face {face}",
-                "; enlarge the outer cage or make the edit discrete",
+                f"outer cage must contain the inner cage: {deformed.handle_noun} {k} at"
+                f" {format_vector(handles[k])} is {distance:.3g} outside face {face}",
+                "; enlarge the outer cage"
+                + (" or make the edit discrete" if self.inner.is_hexahedron else ""),
             )
-        cure = "; reduce it, enlarge the outer cage, or make the edit discrete"
+        if has_corners:
+            cure = "; reduce it, enlarge the outer cage, or make the edit discrete"
+        else:
+            cure = "; reduce it" if self.outer.follows_edit else "; reduce it, or enlarge the outer cage"
         return (
             f"the {self.shell.name} shell {self._shell(deformed).problem()}",
             "" if deformed is self.inner else cure,
@@ -497,9 +585,9 @@ class Continuous(Edit):
 def _lattice_nodes(edit: Continuous) -> Float32:
     from cagefield.edits.device.edit_lattice import sample_nodes
 
-    if edit.lattice is None:
+    if edit.kernel_lattice is None:
         raise edit.error("only a continuous edit with a lattice has nodes")
-    return sample_nodes(edit.exact_warp, edit.lattice)
+    return sample_nodes(edit.exact_warp, edit.kernel_lattice)
 
 
 @dataclass(frozen=True)
@@ -513,6 +601,11 @@ class Discrete(Edit, ABC):
     unused_shell: ShellSettings = NO_SHELL
 
     def __post_init__(self) -> None:
+        if not self.inner.is_hexahedron:
+            self._refuse(
+                f"a {type(self).__name__.lower()} needs a cage with 8 corners, not {self.inner.plural_noun};"
+                " make the edit continuous, or use a box"
+            )
         self._refuse(problem_of_lattice(self.unused_shell.lattice))
         if isinstance(self.unused_shell.shell, Flow):
             self._refuse(problem_of_unused_falloff(self.unused_shell.shell, "discrete edit"))

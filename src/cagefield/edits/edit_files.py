@@ -29,6 +29,19 @@
         source: ../microphone                 # a copy from another scene, or a file of splats: relative to
                                               # this file's folder, or absolute
         inner: {center: [0, 0, 0], size: 2}   # in that scene's space
+      - name: nose
+        inner: {points: [[0, 0, 1]], radius: 0.5, falloff: smooth}    # or sphere, root, sharp, linear
+        operations:                           # no outer cage: the box around all that is reached
+          - move_point: {point: 0, by: [0, 0.3, 0]}
+          - move_points: {points: [0], by: [0, 0.1, 0]}
+      - name: bent arm
+        inner: {center: [0, 0, 1], size: [0.3, 0.3, 1], lattice: {points: [2, 2, 5], interpolation: bspline}}
+        outer: {margin: 0.5}                  # a lattice of control points, x fastest; or linear
+        operations:
+          - bend: {axis: z, degrees: 60, towards: x, fixed: start}    # or middle, end; along its own axes
+          - twist: {axis: z, degrees: 30}
+          - taper: {axis: z, factor: 0.8}
+          - move_points: {points: [16, 17], by: [0, 0.1, 0], radius: 0.4, falloff: smooth}
 
 Further keys of an edit: keep_source (discrete: copy instead of move), enabled, allow_folding. Lengths are
 world units, angles degrees. `parse_edits(dump_edits(stack))` is the stack, bit for bit.
@@ -44,15 +57,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from scipy.spatial.transform import Rotation
-
-from cagefield.edits import file_nodes, operations
+from cagefield.edits import file_nodes
+from cagefield.edits.cage_nodes import (
+    dump_cage,
+    dump_inner,
+    dump_margin,
+    parse_cage,
+    parse_inner,
+    parse_outer,
+)
 from cagefield.edits.edit import Continuous, Copy, Delete, Edit, ImpossibleEditError, Move, Paste
 from cagefield.edits.edit_names import problem_of_name, sanitize_name
 from cagefield.edits.file_nodes import Node
+from cagefield.edits.operation_nodes import dump_operation, parse_operation
 from cagefield.edits.operation_sequence import problem_of_count
-from cagefield.edits.operations import Operation, euler_degrees
 from cagefield.edits.options import DEFAULT_FEATHER_VOXELS, CastShadow, Clone, problem_of_lattices
 from cagefield.edits.shells import Flow, ShellKind, ShellSettings, problem_of_unused_falloff, shell_kind
 from cagefield.edits.stack import EditStack
@@ -60,13 +78,10 @@ from cagefield.errors import CagefieldError, EditError, EditFileError
 from cagefield.files.atomic import replaced_file
 from cagefield.files.safe_open import read_text
 from cagefield.geometry.cage import Cage
-from cagefield.typing import Array
 
 VERSION = 1
 MAX_EDITS = 500
 """Edits of a file: each takes a millisecond to be checked."""
-
-_SHEARS = ("xy", "xz", "yx", "yz", "zx", "zy")
 
 
 def load_edits(path: str | os.PathLike[str], *, check: bool = True, mend: bool = False) -> EditStack:
@@ -112,7 +127,7 @@ def _stack(node: Node, check: bool, mend: bool) -> EditStack:
     if len(items) > MAX_EDITS:
         raise node.error(f"{len(items)} edits are too many, a file has at most {MAX_EDITS}; leave some out")
     edits = [_edit(item, check, mend) for item in items]
-    shown = (edit.lattice for edit in edits if edit.enabled and isinstance(edit, Continuous))
+    shown = (edit.kernel_lattice for edit in edits if edit.enabled and isinstance(edit, Continuous))
     if (problem := problem_of_lattices(shown)) is not None:
         if not mend:
             raise node.error(problem)
@@ -171,8 +186,8 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
             "source",
         ),
     )
-    inner = _cage(keys["inner"])
-    outer = None if "outer" not in keys or keys["outer"].is_null else _outer(keys["outer"], inner)
+    inner = parse_inner(keys["inner"])
+    outer = None if "outer" not in keys or keys["outer"].is_null else parse_outer(keys["outer"], inner)
     options: dict[str, Any] = {}
     if "fill" in keys:
         options["fill"] = _fill(keys["fill"])
@@ -187,7 +202,7 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
     items = keys["operations"].items() if "operations" in keys else []
     if (problem := problem_of_count(len(items))) is not None:
         raise keys["operations"].error(problem)
-    options["operations"] = tuple(_operation(item) for item in items)
+    options["operations"] = tuple(parse_operation(item) for item in items)
     try:
         edit = _of_kind(keys, inner, outer, options)
     except ImpossibleEditError as error:
@@ -280,7 +295,7 @@ def _relight(node: Node) -> Any:
 def _fill(node: Node) -> Any:
     """Infill of an edit: a word, or {clone: cage}."""
     if node.is_mapping:
-        return Clone(_cage(node.mapping(required=("clone",))["clone"]))
+        return Clone(parse_cage(node.mapping(required=("clone",))["clone"]))
     return node.text()
 
 
@@ -295,80 +310,6 @@ def _name(node: Node, mend: bool) -> str:
     return sanitize_name(name)
 
 
-def _cage(node: Node) -> Cage:
-    keys = node.mapping(optional=("center", "size", "rotation_deg", "corners", "pivot"))
-    if "corners" in keys:
-        for other in ("center", "size", "rotation_deg"):
-            if other in keys:
-                raise keys[other].error("a cage has either corners or center and size; remove one")
-        corners = [corner.vector() for corner in keys["corners"].items(8)]
-        values: Any = np.array(corners)
-    elif "center" in keys and "size" in keys:
-        rotation = keys["rotation_deg"].vector() if "rotation_deg" in keys else (0.0, 0.0, 0.0)
-        values = Cage.box(keys["center"].vector(), keys["size"].factors(), np.radians(rotation)).corners
-    else:
-        missing = "size" if "center" in keys else "center"
-        raise node.error(f'a cage needs center and size, or 8 corners; "{missing}" is missing')
-    # The pivot of a box is the centre as written; the mean of its corners can differ in the last bit.
-    place = keys.get("pivot", keys.get("center"))
-    pivot = None if place is None else place.vector()
-    try:
-        return Cage(values, pivot=pivot)  # type: ignore[arg-type]
-    except CagefieldError as error:
-        raise node.error(str(error)) from None
-
-
-def _outer(node: Node, inner: Cage) -> Cage:
-    if "margin" not in node.names():
-        return _cage(node)
-    return inner.grown(node.mapping(required=("margin",))["margin"].factors())
-
-
-def _operation(node: Node) -> Operation:
-    names = (
-        "translate",
-        "rotate_deg",
-        "scale",
-        "shear",
-        "move_corner",
-        "move_edge",
-        "move_face",
-        "move_corners",
-    )
-    keys = node.mapping(optional=names)
-    if len(keys) != 1:
-        raise node.error(
-            f"an operation is one of {', '.join(names)}; got {' and '.join(keys) if keys else 'nothing'}:"
-            " start each operation with its own dash"
-        )
-    name, value = next(iter(keys.items()))
-    if name == "translate":
-        return operations.Translate(value.vector())
-    if name in ("rotate_deg", "scale"):
-        inner = value.mapping(required=("by",), optional=("axes",)) if value.is_mapping else {"by": value}
-        axes: Any = inner["axes"].choice(("world", "cage")) if "axes" in inner else "world"
-        if name == "rotate_deg":
-            return operations.Rotate(inner["by"].vector(), axes)
-        return operations.Scale(inner["by"].factors(), axes)
-    if name == "shear":
-        parts = value.mapping(optional=(*_SHEARS, "axes"))
-        axes = parts.pop("axes").choice(("world", "cage")) if "axes" in parts else "world"
-        return operations.Shear(**{pair: part.number() for pair, part in parts.items()}, axes=axes)
-    if name == "move_corner":
-        parts = value.mapping(required=("corner", "by"))
-        return operations.MoveCorner(parts["corner"].integer(0, 7), parts["by"].vector())
-    if name == "move_edge":
-        parts = value.mapping(required=("edge", "by"))
-        i, j = (end.integer(0, 7) for end in parts["edge"].items(2))
-        return operations.MoveEdge((i, j), parts["by"].vector())
-    if name == "move_corners":
-        parts = value.mapping(required=("corners", "by"))
-        corners = tuple(corner.integer(0, 7) for corner in parts["corners"].items())
-        return operations.MoveCorners(corners, parts["by"].vector())
-    parts = value.mapping(required=("face", "by"))
-    return operations.MoveFace(parts["face"].text(), parts["by"].vector())
-
-
 def _from_edit(edit: Edit) -> dict[str, Any]:
     content: dict[str, Any] = {"name": edit.name} if edit.name else {}
     settings = edit.shell_settings
@@ -376,11 +317,11 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
         content["delete"] = True
     if isinstance(edit, Paste):
         content["source"] = edit.source
-    content["inner"] = _from_cage(edit.inner)
-    if settings.outer is not None:
-        content["outer"] = _margin(edit.inner, settings.outer) or _from_cage(settings.outer)
+    content["inner"] = dump_inner(edit.inner)
+    if settings.outer is not None and not settings.outer.follows_edit:
+        content["outer"] = dump_margin(edit.inner, settings.outer) or dump_cage(settings.outer)
     if edit.operations:
-        content["operations"] = [_from_operation(operation) for operation in edit.operations]
+        content["operations"] = [dump_operation(operation) for operation in edit.operations]
     if not isinstance(edit, Delete | Paste):
         content["adjustment"] = "continuous" if isinstance(edit, Continuous) else "discrete"
     if isinstance(edit, Continuous) or not isinstance(settings.shell, Flow):
@@ -393,7 +334,7 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
     if isinstance(edit, Copy):
         content["keep_source"] = True
     if isinstance(edit.fill, Clone):
-        content["fill"] = {"clone": _from_cage(edit.fill.source)}
+        content["fill"] = {"clone": dump_cage(edit.fill.source)}
     elif edit.fill != "surroundings":
         content["fill"] = edit.fill
     if isinstance(edit.relight, CastShadow):
@@ -409,61 +350,6 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
     if settings.allow_folding:
         content["allow_folding"] = True
     return content
-
-
-def _from_cage(cage: Cage) -> dict[str, Any]:
-    """A cage as centre, size and rotation where that gives back its very corners, else as corners."""
-    R, _ = np.linalg.qr(cage.affine[0])
-    R = R * np.sign(np.diag(R.T @ cage.affine[0]))
-    rotation = euler_degrees(Rotation.from_matrix(R))
-    size = np.linalg.norm(cage.affine[0], axis=0)
-    for digits in (12, 9, 6):
-        # Numbers written by a person have few digits; computed ones are tried last, as they are.
-        center, lengths, turn = (_short(v, digits) for v in (cage.pivot, size, rotation))
-        if (lengths > 0.0).all() and Cage.box(center, lengths, np.radians(turn)) == cage:
-            content: dict[str, Any] = {"center": center.tolist(), "size": lengths.tolist()}
-            return content | ({"rotation_deg": turn.tolist()} if turn.any() else {})
-    content = {"corners": cage.corners.tolist()}
-    return content if Cage(cage.corners) == cage else content | {"pivot": cage.pivot.tolist()}
-
-
-def _margin(inner: Cage, outer: Cage) -> dict[str, Any] | None:
-    """The outer cage as a margin where that gives back its very corners."""
-    edges = inner.frame[1]
-    margin = (np.linalg.norm(outer.affine[0], axis=0) - np.linalg.norm(edges, axis=0)) / 2.0
-    for digits in (12, 9, 6):
-        m = _short(margin, digits)
-        if (m > 0.0).all() and inner.grown(m) == outer:
-            return {"margin": float(m[0]) if (m == m[0]).all() else m.tolist()}
-    return None
-
-
-def _from_operation(operation: Operation) -> dict[str, Any]:
-    if isinstance(operation, operations.Translate):
-        return {"translate": list(operation.by)}
-    if isinstance(operation, operations.Rotate):
-        return {"rotate_deg": _with_axes(operation.degrees, operation.axes)}
-    if isinstance(operation, operations.Scale):
-        return {"scale": _with_axes(operation.by, operation.axes)}
-    if isinstance(operation, operations.Shear):
-        content: dict[str, Any] = {name: value for name, value in operation.factors.items() if value != 0.0}
-        return {"shear": content | ({"axes": operation.axes} if operation.axes != "world" else {})}
-    if isinstance(operation, operations.MoveCorner):
-        return {"move_corner": {"corner": int(operation.corner), "by": list(operation.by)}}
-    if isinstance(operation, operations.MoveEdge):
-        return {"move_edge": {"edge": [int(k) for k in operation.edge], "by": list(operation.by)}}
-    if isinstance(operation, operations.MoveCorners):
-        corners = [int(k) for k in operation.corners]
-        return {"move_corners": {"corners": corners, "by": list(operation.by)}}
-    return {"move_face": {"face": operation.face, "by": list(operation.by)}}
-
-
-def _with_axes(by: tuple[float, float, float], axes: str) -> Any:
-    return list(by) if axes == "world" else {"by": list(by), "axes": axes}
-
-
-def _short(v: Array, digits: int) -> Array:
-    return np.round(v, digits) + 0.0  # + 0.0 turns -0.0 into 0.0
 
 
 def _format_of(file: Path) -> str:

@@ -1,20 +1,21 @@
 """Operations on a cage as values, so that an edit can be saved, undone, and done in part.
 
 Each is applied with `apply(cage)`; `part(t)` is the same operation gone through to t in [0,1]: lengths and
-shears times t, the rotation about the same axis by t times the angle, scale factors to the power t.
+shears times t, angles of rotations, bends and twists times t, factors of scalings and tapers to the power t.
 """
 
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import ClassVar, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from cagefield.geometry.cage import FACES, Axes, Cage
+from cagefield.errors import CageError
+from cagefield.geometry.cage import FACES, Axes, Cage, LatticeCage
 from cagefield.geometry.cage_checks import factors, vector
 
 Triple: TypeAlias = tuple[float, float, float]
@@ -231,7 +232,154 @@ class MoveCorners:
         return f"{', '.join(map(str, self.corners))} by {_show(self.by)}"
 
 
-Operation: TypeAlias = Translate | Rotate | Scale | Shear | MoveCorner | MoveEdge | MoveFace | MoveCorners
+@dataclass(frozen=True)
+class MovePoint:
+    """Move one control point, numbered x fastest, by a vector; the pivot stays."""
+
+    point: int
+    by: Triple
+    noun: ClassVar[str] = "point move"
+
+    def apply(self, cage: Cage) -> Cage:
+        """The deformed cage."""
+        return cage.move_point(self.point, self.by)
+
+    def part(self, t: float) -> MovePoint:
+        """The share t of the move."""
+        return MovePoint(self.point, _times(self.by, t))
+
+    def __str__(self) -> str:
+        return f"of point {self.point} by {_show(self.by)}"
+
+
+@dataclass(frozen=True)
+class MovePoints:
+    """Move control points together by a vector; the pivot stays.
+
+    With a radius > 0, in world units, points around them go along in part (proportional editing), by the
+    weight of `falloff`: "smooth", "sphere", "root", "sharp" or "linear".
+    """
+
+    points: tuple[int, ...]
+    by: Triple
+    radius: float = 0.0
+    falloff: str = "smooth"
+    noun: ClassVar[str] = "move of points"
+
+    def apply(self, cage: Cage) -> Cage:
+        """The deformed cage."""
+        return cage.move_points(self.points, self.by, radius=self.radius, falloff=self.falloff)
+
+    def part(self, t: float) -> MovePoints:
+        """The share t of the move."""
+        return replace(self, by=_times(self.by, t))
+
+    def __str__(self) -> str:
+        named = ", ".join(map(str, self.points[:8])) + (", ..." if len(self.points) > 8 else "")
+        return f"{named} by {_show(self.by)}"
+
+
+@dataclass(frozen=True)
+class Bend:
+    """Bend a lattice: its middle line along an axis of its own becomes an arc of that many degrees.
+
+    `towards` is another of its axes, "" the next in the order x, y, z, x; `fixed` ("start", "middle" or
+    "end") is where along the axis nothing moves.
+    """
+
+    axis: str
+    degrees: float
+    towards: str = ""
+    fixed: str = "start"
+    noun: ClassVar[str] = "bend"
+
+    def apply(self, cage: Cage) -> Cage:
+        """The bent cage."""
+        lattice = _lattice(cage, "bend")
+        return lattice.bend(self.axis, np.radians(self.degrees), towards=self.towards, fixed=self.fixed)
+
+    def part(self, t: float) -> Bend:
+        """The bend by t times the angle."""
+        return replace(self, degrees=t * self.degrees)
+
+    def __str__(self) -> str:
+        return f"along {self.axis} by {self.degrees:.4g} degrees"
+
+
+@dataclass(frozen=True)
+class Twist:
+    """Twist a lattice about an axis of its own by that many degrees from end to end; see `Bend`."""
+
+    axis: str
+    degrees: float
+    fixed: str = "start"
+    noun: ClassVar[str] = "twist"
+
+    def apply(self, cage: Cage) -> Cage:
+        """The twisted cage."""
+        return _lattice(cage, "twist").twist(self.axis, np.radians(self.degrees), fixed=self.fixed)
+
+    def part(self, t: float) -> Twist:
+        """The twist by t times the angle."""
+        return replace(self, degrees=t * self.degrees)
+
+    def __str__(self) -> str:
+        return f"about {self.axis} by {self.degrees:.4g} degrees"
+
+
+@dataclass(frozen=True)
+class Taper:
+    """Scale a lattice across an axis of its own, evenly to a factor > 0 at its end; see `Bend`."""
+
+    axis: str
+    factor: float
+    fixed: str = "start"
+    noun: ClassVar[str] = "taper"
+
+    def apply(self, cage: Cage) -> Cage:
+        """The tapered cage."""
+        return _lattice(cage, "taper").taper(self.axis, self.factor, fixed=self.fixed)
+
+    def part(self, t: float) -> Taper:
+        """The taper by the factor to the power t."""
+        return replace(self, factor=float(np.power(self.factor, t))) if self.factor > 0.0 else self
+
+    def __str__(self) -> str:
+        return f"along {self.axis} by {self.factor:.4g}"
+
+
+def _lattice(cage: Cage, name: str) -> LatticeCage:
+    """The cage as a lattice; a `CageError` with the cure for others."""
+    if isinstance(cage, LatticeCage):
+        return cage
+    raise CageError(
+        f"a {name} needs a lattice of control points, and this cage has none; give it cells along the axis:"
+        " cage.subdivided((1, 1, 4)) in Python, lattice: {points: [2, 2, 5]} in a file"
+    )
+
+
+Operation: TypeAlias = (
+    Translate
+    | Rotate
+    | Scale
+    | Shear
+    | MoveCorner
+    | MoveEdge
+    | MoveFace
+    | MoveCorners
+    | MovePoint
+    | MovePoints
+    | Bend
+    | Twist
+    | Taper
+)
+
+
+def degrees(radians: float) -> float:
+    """An angle in degrees; within rounding of a short decimal number it becomes that number."""
+    angle = float(np.degrees(radians))
+    short = round(angle, 9)
+    return short if abs(angle - short) <= 4e-16 * abs(angle) else angle
 
 
 def displacement(by: ArrayLike, name: str) -> Triple:

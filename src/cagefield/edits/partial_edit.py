@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from cagefield.edits.edit import Delete, Edit, Paste
+from cagefield.geometry.cage import Cage
 
 MIN_SHOWN_SHARE = 0.5
 """Share from which a delete or a paste is shown: neither has an intermediate state."""
@@ -17,4 +20,9 @@ def partial_edit(edit: Edit, share: float) -> Edit | None:
         return edit if share >= MIN_SHOWN_SHARE else None
     if share >= 1.0:
         return edit
-    return edit.replace(operations=tuple(operation.part(share) for operation in edit.operations))
+    there = edit.replace(operations=tuple(operation.part(share) for operation in edit.operations))
+    outer = edit.shell_settings.outer
+    if outer is None or not outer.follows_edit:
+        return there
+    # One outer cage for the whole way: pages interpolate between lattices of one place.
+    return there.with_shell_settings(replace(there.shell_settings, outer=Cage(outer.corners)))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
-from cagefield.warps import FALLOFFS, Falloff, FlowShell, Shell, TrilinearShell
+from cagefield.warps import FALLOFFS, Falloff, Shell, TrilinearShell, flow_between
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,10 @@ class ShellKind(ABC):
     @abstractmethod
     def build(self, inner: Cage, deformed: Cage, outer: Cage) -> Shell:
         """Shell map between the outer cage and the inner cage, which goes from `inner` to `deformed`."""
+
+    def problem_of_inner(self, inner: Cage) -> str | None:
+        """Why the kind has no map around such an inner cage, and the cure; None where it has one."""
+        return None
 
 
 def problem_of_falloff(falloff: str, width: float) -> str | None:
@@ -57,7 +61,15 @@ class Flow(ShellKind):
         return "flow"
 
     def build(self, inner: Cage, deformed: Cage, outer: Cage) -> Shell:
-        return FlowShell(inner, deformed, outer, Falloff(self.falloff, self.width))
+        return flow_between(inner, deformed, outer, Falloff(self.falloff, self.width))
+
+    def problem_of_inner(self, inner: Cage) -> str | None:
+        if not inner.has_own_falloff or self == SMOOTH_FLOW:
+            return None
+        return (
+            f"{inner.plural_noun} have a falloff and a radius of their own; leave out falloff and width of"
+            " the shell"
+        )
 
 
 @dataclass(frozen=True)
@@ -70,6 +82,11 @@ class Trilinear(ShellKind):
 
     def build(self, inner: Cage, deformed: Cage, outer: Cage) -> Shell:
         return TrilinearShell(inner, deformed, outer)
+
+    def problem_of_inner(self, inner: Cage) -> str | None:
+        if inner.is_hexahedron:
+            return None
+        return f"a trilinear shell joins cages with 8 corners, not {inner.plural_noun}; use the flow shell"
 
 
 SHELL_KINDS: dict[str, type[Flow] | type[Trilinear]] = {"flow": Flow, "trilinear": Trilinear}

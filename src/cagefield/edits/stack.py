@@ -103,7 +103,7 @@ class EditStack(EditMap):
     def check(self) -> None:
         """Raise `EditError` for the first active edit that cannot be evaluated, or too large lattices."""
         too_large = problem_of_lattices(
-            edit.lattice for edit in self.edits if edit.enabled and isinstance(edit, Continuous)
+            edit.kernel_lattice for edit in self.edits if edit.enabled and isinstance(edit, Continuous)
         )
         if too_large is not None:
             raise EditError(too_large)

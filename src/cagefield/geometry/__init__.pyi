@@ -1,1 +1,3 @@
 from .cage import Cage as Cage
+from .cage import LatticeCage as LatticeCage
+from .control_points import ControlPoints as ControlPoints

@@ -10,20 +10,34 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal, TypeAlias
+from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from cagefield.errors import CageError
-from cagefield.geometry import hexahedron
-from cagefield.geometry.cage_checks import check_orientation, corner_number, factors, read_only, vector
+from cagefield.geometry import bspline_lattice, hexahedron, point_deformers
+from cagefield.geometry.cage_checks import (
+    check_lattice,
+    check_orientation,
+    check_shear,
+    corner_number,
+    factors,
+    lattice_shape,
+    point_numbers,
+    read_only,
+    vector,
+)
 from cagefield.geometry.hexahedron import EDGES as EDGES
 from cagefield.geometry.hexahedron import FACES as FACES
+from cagefield.geometry.lattice_points import LatticePoints
 from cagefield.typing import Array, Mask
 
 Axes: TypeAlias = Literal["world", "cage"]
+
+MAX_WAY_STATES = 64
+"""Earlier states that a lattice remembers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +61,21 @@ class Cage:
     corners: Array
     pivot: Array = field(default=None, kw_only=True)  # type: ignore[arg-type]
 
+    is_hexahedron: ClassVar[bool] = True
+    """False for cages of other shapes, whose `corners` are those of a box around them."""
+
+    follows_edit: ClassVar[bool] = False
+    """True for outer cages that are made anew with the operations of their edit."""
+
+    has_own_falloff: ClassVar[bool] = False
+    """True for cages that say how the motion fades around them, in place of the shell."""
+
+    handle_noun: ClassVar[str] = "inner corner"
+    """One of `handles`, in messages."""
+
+    plural_noun: ClassVar[str] = "cages"
+    """Such cages, in messages."""
+
     def __post_init__(self) -> None:
         corners = read_only(self.corners, (8, 3), "cage corners")
         pivot = corners.mean(axis=0) if self.pivot is None else self.pivot
@@ -66,7 +95,7 @@ class Cage:
         return cls(c + offsets, pivot=c)
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Cage):
+        if type(self) is not type(other) or not isinstance(other, Cage):
             return NotImplemented
         return np.array_equal(self.corners, other.corners) and np.array_equal(self.pivot, other.pivot)
 
@@ -77,9 +106,18 @@ class Cage:
         return f"Cage(corners={self.corners.tolist()})"
 
     @property
+    def handles(self) -> Array:
+        """Points [n,3] by which the cage is moved, all of which an outer cage must hold: its corners."""
+        return self.corners
+
+    def has_shape_of(self, other: Cage) -> bool:
+        """True where another cage of this kind lies in the same place, but for its pivot."""
+        return type(self) is type(other) and np.array_equal(self.corners, other.corners)
+
+    @property
     def center(self) -> Array:
-        """Mean of the 8 corners [3]."""
-        return np.asarray(self.corners.mean(axis=0))
+        """Mean of the `handles` [3]."""
+        return np.asarray(self.handles.mean(axis=0))
 
     @property
     def edges(self) -> tuple[tuple[int, int], ...]:
@@ -93,8 +131,8 @@ class Cage:
 
     @property
     def aabb(self) -> Array:
-        """Axis-aligned box [2,3] (min, max) of the cage; the cage lies in the hull of its corners."""
-        return np.stack([self.corners.min(axis=0), self.corners.max(axis=0)])
+        """Axis-aligned box [2,3] (min, max) of the cage; the cage lies in the hull of its handles."""
+        return np.stack([self.handles.min(axis=0), self.handles.max(axis=0)])
 
     @cached_property
     def affine(self) -> tuple[Array, Array]:
@@ -115,7 +153,7 @@ class Cage:
         A, b = self.affine
         if self.is_affine:
             return b, A
-        u = (self.corners - b) @ np.linalg.inv(A).T
+        u = (self.handles - b) @ np.linalg.inv(A).T
         low, high = u.min(axis=0), u.max(axis=0)
         return b + A @ low, A * (high - low)
 
@@ -161,7 +199,7 @@ class Cage:
     def translate(self, by: ArrayLike) -> Cage:
         """The cage moved by a vector [3]; the pivot travels with it."""
         v = vector(by, "translate")
-        return Cage(self.corners + v, pivot=self.pivot + v)
+        return self._moved(self.handles + v, self.pivot + v, rigid=True)
 
     def rotate(self, rotation: Rotation | ArrayLike, *, axes: Axes = "world") -> Cage:
         """The cage turned about its pivot by a SciPy `Rotation`, or by intrinsic XYZ angles [3] in radians.
@@ -197,13 +235,7 @@ class Cage:
     ) -> Cage:
         """The cage sheared about its pivot: `xy` adds xy * y to x, and so on for the other pairs."""
         S = np.array([[1.0, xy, xz], [yx, 1.0, yz], [zx, zy, 1.0]])
-        if not np.isfinite(S).all():
-            raise CageError(f"shear factors must be finite, got {_named_shears(S)}")
-        if np.linalg.det(S) <= 0.0:
-            raise CageError(
-                f"shear must not turn space inside out: {_named_shears(S)} has determinant"
-                f" {np.linalg.det(S):.3g}; use smaller factors"
-            )
+        check_shear(S)
         return self._linear(S, axes, own=True)
 
     def move_corner(self, corner: int, by: ArrayLike) -> Cage:
@@ -235,62 +267,137 @@ class Cage:
             raise CageError(f'axes must be "world" or "cage", got "{axes}"')
         if own and axes == "cage":
             M = self.axes @ M @ np.linalg.inv(self.axes)
-        return Cage(self.pivot + (self.corners - self.pivot) @ M.T, pivot=self.pivot)
+        return self._moved(self.pivot + (self.handles - self.pivot) @ M.T, self.pivot, rigid=True)
+
+    def move_point(self, point: int, by: ArrayLike) -> Cage:
+        """The cage with one of its `handles` moved by a vector [3]; the pivot stays."""
+        return self.move_points((point,), by)
+
+    def move_points(
+        self, points: Iterable[int], by: ArrayLike, *, radius: float = 0.0, falloff: str = "smooth"
+    ) -> Cage:
+        """The cage with some of its `handles`, each named once, moved by one vector [3]; the pivot stays.
+
+        With a radius > 0 (world units) points around them go along in part, by the weight of `falloff`
+        ("smooth", "sphere", "root", "sharp" or "linear") at their distance from the nearest moved point.
+        """
+        v = vector(by, "move_points")
+        chosen = point_numbers(points, len(self.handles))
+        weight = np.zeros(len(self.handles))
+        if not (np.isfinite(radius) and radius >= 0.0):
+            raise CageError(f"radius must be 0 or a positive distance, got {radius!r}")
+        if radius > 0.0:
+            distance = np.linalg.norm(self.handles[:, None] - self.handles[chosen], axis=2).min(axis=1)
+            weight = point_deformers.falloff_weight(distance, radius, falloff)
+        weight[chosen] = 1.0
+        return self._moved(self.handles + weight[:, None] * v, self.pivot)
+
+    def subdivided(self, cells: Iterable[int], interpolation: str = "bspline") -> LatticeCage:
+        """A lattice of control points, one more than `cells` [3] (1 to 7) along each axis, in the same place.
+
+        `interpolation` is "bspline" or "linear", see `LatticeCage`.
+        """
+        shape = lattice_shape([n + 1 for n in cells])
+        points = hexahedron.points(self.corners, bspline_lattice.grid(shape))
+        return LatticeCage(points, shape, interpolation, pivot=self.pivot)
+
+    def mirrored(self, axis: int, at: float) -> Cage:
+        """The cage across the plane where coordinate `axis`, 0 to 2, is `at`.
+
+        A mirrored cage would be inside out, so its corners are numbered the other way along that axis.
+        """
+        corners = point_deformers.mirrored(
+            self.corners[[self.mirrored_handle(k, axis) for k in range(8)]], axis, at
+        )
+        return Cage(corners, pivot=point_deformers.mirrored(self.pivot, axis, at))
+
+    def mirrored_handle(self, handle: int, axis: int) -> int:
+        """The number, in the mirrored cage, of the mirror image of one of the `handles`."""
+        return handle ^ 1 << axis
+
+    def _moved(self, points: Array, pivot: Array, *, rigid: bool = False) -> Cage:
+        """The cage with its `handles` elsewhere; `rigid` where one affine map takes all of them there."""
+        return Cage(points, pivot=pivot)
 
     def _move(self, corners: tuple[int, ...], by: Array) -> Cage:
         moved = self.corners.copy()
         moved[list(corners)] += by
-        return Cage(moved, pivot=self.pivot)
+        return self._moved(moved, self.pivot)
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class LatticeCage(LatticePoints["LatticeCage"], Cage):
+    """A cage of 2 to 8 control points along each axis; its inside is their spline, see `bspline_lattice`.
+
+    "bspline" is twice continuously differentiable throughout; "linear" is continuous, with kinks between the
+    cells. The points of `Cage.subdivided` lie evenly, and then the spline is the cage's own trilinear map.
+
+    Parameters: points [n,3] in world units, x fastest; shape (nx, ny, nz); interpolation; pivot [3], the mean
+    of the points if left out. `corners` [8,3] are the outermost control points where they make a valid
+    hexahedron, else the corners of `frame`: for gizmos and boxes, not for the map.
+
+    `way` holds the control points of earlier states, which operations leave: a map may follow them.
+
+    Operations move all control points; moving corners, edges or faces moves them by trilinear weights.
+
+    Raises `CageError` for a wrong number of points, and where the Jacobian determinant is not proven positive
+    over the whole lattice (Bernstein coefficients with subdivision, `lattice_determinant`).
+    """
+
+    is_hexahedron: ClassVar[bool] = False
+    handle_noun: ClassVar[str] = "control point"
+    plural_noun: ClassVar[str] = "lattices"
+
+    def __init__(
+        self,
+        points: ArrayLike,
+        shape: Iterable[int],
+        interpolation: str = "bspline",
+        *,
+        pivot: ArrayLike | None = None,
+        proven: bool = False,
+        way: tuple[Array, ...] = (),
+    ) -> None:
+        counts = lattice_shape(shape)
+        control = read_only(points, (int(np.prod(counts)), 3), "lattice points")
+        place = control.mean(axis=0) if pivot is None else pivot
+        object.__setattr__(self, "control_points", control)
+        object.__setattr__(self, "shape", counts)
+        object.__setattr__(self, "interpolation", interpolation)
+        object.__setattr__(self, "way", way)
+        object.__setattr__(self, "pivot", read_only(place, (3,), "cage pivot"))
+        check_lattice(control, counts, interpolation, proven=proven)
+        object.__setattr__(self, "corners", self.outermost)
+
+    def mirrored(self, axis: int, at: float) -> LatticeCage:
+        """The lattice across the plane where coordinate `axis` is `at`, numbered the other way along it."""
+        order = [self.mirrored_handle(k, axis) for k in range(len(self.handles))]
+        points, pivot = (
+            point_deformers.mirrored(self.handles[order], axis, at),
+            point_deformers.mirrored(self.pivot, axis, at),
+        )
+        return LatticeCage(points, self.shape, self.interpolation, pivot=pivot, proven=True)
+
+    def subdivided(self, cells: Iterable[int], interpolation: str = "bspline") -> LatticeCage:
+        """The lattice's even grid with other cells; raises `CageError` once points have been moved."""
+        if not self.is_affine:
+            raise CageError("a lattice is subdivided before its points are moved; subdivide the box instead")
+        return super().subdivided(cells, interpolation)
+
+    def _moved(
+        self, points: Array, pivot: Array, *, rigid: bool = False, way: tuple[Array, ...] = ()
+    ) -> LatticeCage:
+        way = (*self.way, self.control_points, *way)[-MAX_WAY_STATES:]
+        return LatticeCage(points, self.shape, self.interpolation, pivot=pivot, proven=rigid, way=way)
+
+    def _move(self, corners: tuple[int, ...], by: Array) -> Cage:
+        u = bspline_lattice.grid(self.shape)
+        weight = np.zeros(len(u))
+        for bits in hexahedron.BITS[list(corners)]:
+            weight += np.where(bits == 1.0, u, 1.0 - u).prod(axis=1)
+        return self._moved(self.control_points + weight[:, None] * by, self.pivot)
 
 
 def rotation_matrix(theta: ArrayLike) -> Array:
     """R_x R_y R_z [3,3], right-handed, for intrinsic XYZ angles [3] in radians."""
     return np.asarray(Rotation.from_euler("XYZ", np.asarray(theta, dtype=np.float64)).as_matrix())
-
-
-def outside_by(cage: Cage, point: ArrayLike) -> tuple[str, float]:
-    """(face, distance) of the face of the cage that the point [3] is furthest outside of.
-
-    The distance is signed, positive outside, and measured from the face's nearest point along the outward
-    normal there; for planar faces it is the distance to the face's plane.
-    """
-    p = vector(point, "point")
-    best = ("", -np.inf)
-    for name, ids in FACES.items():
-        distance = _face_distance(cage, ids, p, outward=1.0 if name[0] == "+" else -1.0)
-        if distance > best[1]:
-            best = (name, distance)
-    return best
-
-
-def _face_distance(cage: Cage, ids: tuple[int, ...], p: Array, outward: float) -> float:
-    """Signed distance of p from the bilinear face with corners `ids`, along its normal nearest to p."""
-    v = cage.corners[list(ids)]
-    axis = next(a for a in range(3) if len({k >> a & 1 for k in ids}) == 1)
-    # The face's two directions taken in cyclic order span the axis' positive normal; y has them swapped.
-    sign = outward if axis != 1 else -outward
-    normal = np.cross(v[3] - v[0], v[2] - v[1])
-    size = float(np.linalg.norm(normal))
-    if abs(float((v[1] - v[0]) @ normal)) <= 1e-9 * size**1.5:
-        return sign * float((p - v[0]) @ normal) / size
-    a, b = np.meshgrid(np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 9))
-    s, t = a.ravel(), b.ravel()
-    grid = np.outer((1 - s) * (1 - t), v[0]) + np.outer(s * (1 - t), v[1])
-    grid += np.outer((1 - s) * t, v[2]) + np.outer(s * t, v[3])
-    nearest = int(np.argmin(((grid - p) ** 2).sum(axis=1)))
-    st = np.array([s[nearest], t[nearest]])
-    for _ in range(20):
-        ds = (1 - st[1]) * (v[1] - v[0]) + st[1] * (v[3] - v[2])
-        dt = (1 - st[0]) * (v[2] - v[0]) + st[0] * (v[3] - v[1])
-        x = v[0] + st[0] * (v[1] - v[0]) + st[1] * dt
-        before = st
-        st = np.clip(st + np.linalg.lstsq(np.stack([ds, dt], axis=1), p - x, rcond=None)[0], 0.0, 1.0)
-        if np.abs(st - before).max() < 1e-12:
-            break
-    normal = np.cross(ds, dt)
-    return sign * float((p - x) @ normal) / float(np.linalg.norm(normal))
-
-
-def _named_shears(S: Array) -> str:
-    names = {f"{a}{b}": S[i, j] for i, a in enumerate("xyz") for j, b in enumerate("xyz") if i != j}
-    return ", ".join(f"{name}={value:g}" for name, value in names.items() if value != 0.0)

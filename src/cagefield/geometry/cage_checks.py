@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cagefield.errors import CageError
-from cagefield.geometry import hexahedron, hexahedron_determinant
+from cagefield.geometry import bspline_lattice, hexahedron, hexahedron_determinant, lattice_determinant
 from cagefield.typing import Array, Mask
+
+MOST_POINTS = 8
+"""Control points of a lattice along an axis."""
 
 _FLAT = 1e-9
 """Least Jacobian determinant of a valid cage, as a share of the product of its mean edge lengths."""
@@ -55,6 +60,61 @@ def corner_number(corner: int) -> int:
     if isinstance(corner, bool) or not isinstance(corner, (int, np.integer)) or not 0 <= corner <= 7:
         raise CageError(f"corner {corner!r} is not a corner of a cage: corners are 0 to 7, k = x + 2y + 4z")
     return int(corner)
+
+
+def point_numbers(points: Iterable[int], count: int) -> NDArray[np.intp]:
+    """Numbers [k] of points of a cage with that many, each named once, or a `CageError`."""
+    chosen = list(points)
+    for point in chosen:
+        if isinstance(point, bool) or not isinstance(point, int | np.integer) or not 0 <= point < count:
+            raise CageError(f"point {point!r} is not a point of this cage: its points are 0 to {count - 1}")
+    if not chosen or len(set(chosen)) < len(chosen):
+        raise CageError(f"points must name one or more points, each once, got {chosen}")
+    return np.array(chosen, dtype=np.intp)
+
+
+def lattice_shape(shape: Iterable[int]) -> tuple[int, int, int]:
+    """Control points along x, y and z, 2 to `MOST_POINTS` each, or a `CageError`."""
+    counts = list(shape)
+    whole = all(isinstance(n, int | np.integer) and not isinstance(n, bool) for n in counts)
+    if len(counts) != 3 or not whole or not all(2 <= n <= MOST_POINTS for n in counts):
+        raise CageError(
+            f"a lattice has 2 to {MOST_POINTS} control points along each of three axes (1 to"
+            f" {MOST_POINTS - 1} cells), got points {counts}"
+        )
+    return int(counts[0]), int(counts[1]), int(counts[2])
+
+
+def check_lattice(
+    points: Array, shape: tuple[int, int, int], interpolation: str, *, proven: bool = False
+) -> None:
+    """Raise `CageError` where the determinant of a lattice with points [n,3] is not proven positive."""
+    if interpolation not in bspline_lattice.INTERPOLATIONS:
+        names = " or ".join(bspline_lattice.INTERPOLATIONS)
+        raise CageError(f'interpolation must be {names}, got "{interpolation!s:.40}"')
+    if proven:
+        return
+    answer, cell = lattice_determinant.verdict(points, shape, interpolation)
+    if answer == "proven":
+        return
+    if answer == "undecided":
+        raise CageError(
+            f"lattice is too close to folding in cell {cell}: its determinant is not proven positive there;"
+            " move the control points around that cell less"
+        )
+    A, _ = lattice_determinant.fit(points, shape)
+    if abs(np.linalg.det(A)) <= _FLAT * np.linalg.norm(A, axis=0).prod():
+        raise CageError("lattice has zero size: its control points span no volume")
+    if np.linalg.det(A) < 0.0:
+        raise CageError("lattice is mirrored: list its control points x fastest, in a right-handed frame")
+    least, u = lattice_determinant.least_determinant(points, shape, interpolation)
+    near = np.round(u * (np.array(shape) - 1)).astype(int)
+    number = int(near[0] + shape[0] * (near[1] + shape[1] * near[2]))
+    raise CageError(
+        f"lattice is inside out in cell {cell}, near control point {number} at"
+        f" {format_vector(points[number])}: its determinant falls to {least:.3g} of its mean and must stay"
+        " positive; move the control points there less"
+    )
 
 
 def are_valid(corners: Array) -> Mask:
@@ -105,3 +165,19 @@ def check_orientation(corners: Array) -> None:
         f"cage is inside out at {where}: the Jacobian determinant there is {at_corners[k]:.3g} and must be"
         f" positive; move corner {k} back from the opposite faces"
     )
+
+
+def check_shear(S: Array) -> None:
+    """Raise `CageError` for a shear [3,3] that is not finite or turns space inside out."""
+    if not np.isfinite(S).all():
+        raise CageError(f"shear factors must be finite, got {_named_shears(S)}")
+    if np.linalg.det(S) <= 0.0:
+        raise CageError(
+            f"shear must not turn space inside out: {_named_shears(S)} has determinant"
+            f" {np.linalg.det(S):.3g}; use smaller factors"
+        )
+
+
+def _named_shears(S: Array) -> str:
+    names = {f"{a}{b}": S[i, j] for i, a in enumerate("xyz") for j, b in enumerate("xyz") if i != j}
+    return ", ".join(f"{name}={value:g}" for name, value in names.items() if value != 0.0)

@@ -58,7 +58,7 @@ class PageEdits:
 
 def for_page(edit: Edit) -> Edit:
     """The edit itself, or the same with a lattice in its shell that a page can have."""
-    if not isinstance(edit, Continuous) or (edit.lattice or FINEST_LATTICE + 1) <= FINEST_LATTICE:
+    if not isinstance(edit, Continuous) or (edit.kernel_lattice or FINEST_LATTICE + 1) <= FINEST_LATTICE:
         return edit
     return edit.replace(lattice=LATTICE if edit.lattice is None else FINEST_LATTICE)
 
@@ -191,7 +191,8 @@ def _rows(edit: Edit, row: NDArray[np.float32], first_node: int) -> Float32:
         (at.LAST_SCALAR, row[p.LAST]),
         (at.RESOLUTION_SCALAR, row[p.RESOLUTION]),
         (at.CONTINUOUS_SCALAR, row[p.CONTINUOUS]),
-        (at.SIMPLE_SCALAR, row[p.SIMPLE]),
+        # The page's short way looks for V first.
+        (at.SIMPLE_SCALAR, float(row[p.SIMPLE] > 0.5 and row[p.FIRST] < 0.5)),
         (at.UNDER_SCALAR, row[p.UNDER_PLACE]),
         (at.NODE_SCALAR, first_node),
         (at.PART_SCALAR, row[p.PART_PLACE]),

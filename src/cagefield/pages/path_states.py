@@ -170,8 +170,8 @@ def stack_at(
             raise EditError(f"the camera path shows an edit at {part:.0%} of its way: {error}") from None
         if there is None:
             continue
-        if number in moving and isinstance(there, Continuous) and there.lattice is not None:
-            there = there.replace(lattice=min(nodes, there.lattice))
+        if number in moving and isinstance(there, Continuous) and there.kernel_lattice is not None:
+            there = there.replace(lattice=min(nodes, there.kernel_lattice))
         patch = _patch(edits, on_way or edits, parts, number)
         found.append(PreparedEdit(there, patch, step.pasted))
     return PreparedStack(found)

@@ -11,9 +11,30 @@ One method per file; `cagefield.edits.shells` builds a continuous edit's shell.
 
 from __future__ import annotations
 
+from cagefield.warps.cage_maps import flow_between, inner_map_between, reach_between
+from cagefield.warps.control_point_velocity import ControlPointVelocity
 from cagefield.warps.falloff import FALLOFFS, Falloff
 from cagefield.warps.flow_shell import FlowShell
-from cagefield.warps.interfaces import Mapped, Shell, Warp
+from cagefield.warps.free_form import FreeFormFlow, Velocity
+from cagefield.warps.interfaces import InnerMap, Mapped, NoInnerMap, Shell, Warp
+from cagefield.warps.lattice_shell import LatticeShell
 from cagefield.warps.trilinear_shell import TrilinearShell
 
-__all__ = ["FALLOFFS", "Falloff", "FlowShell", "Mapped", "Shell", "TrilinearShell", "Warp"]
+__all__ = [
+    "FALLOFFS",
+    "ControlPointVelocity",
+    "Falloff",
+    "FlowShell",
+    "FreeFormFlow",
+    "InnerMap",
+    "LatticeShell",
+    "Mapped",
+    "NoInnerMap",
+    "Shell",
+    "TrilinearShell",
+    "Velocity",
+    "Warp",
+    "flow_between",
+    "inner_map_between",
+    "reach_between",
+]

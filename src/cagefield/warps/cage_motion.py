@@ -17,12 +17,12 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cagefield.geometry import hexahedron
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Mask
 from cagefield.warps.extended_coordinates import Extended, slope_columns, straightened_slope
+from cagefield.warps.linear_motion import LinearMotion
 from cagefield.warps.trilinear_bend import (
     AXIS_COEFFICIENTS,
     SIGNS,
@@ -66,10 +66,9 @@ class Motion:
         return self.start.is_affine and self.end.is_affine
 
     @cached_property
-    def _turn(self) -> tuple[Array, Array, Array]:
-        """(rotation vector [3], logarithms of the stretch [3], its directions as columns [3,3])."""
-        U, s, Vt = np.linalg.svd(self.end.frame @ self.start.inverse)
-        return Rotation.from_matrix(U @ Vt).as_rotvec(), np.log(s), Vt.T
+    def _linear(self) -> LinearMotion:
+        """The way of F."""
+        return LinearMotion(self.start.frame, self.end.frame)
 
     @cached_property
     def shrink(self) -> float:
@@ -100,19 +99,7 @@ class Motion:
     def frames(self, t: Array, shrink: float | None = None) -> tuple[Array, Array, Array, Array]:
         """(c [T,3], F [T,3,3], dc/dt [T,3], dF/dt [T,3,3]) at times t [T]."""
         k = self.shrink if shrink is None else shrink
-        turn, stretch, V = self._turn
-        x, y, z = turn
-        omega = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # omega v = turn x v
-        angle = float(np.linalg.norm(turn))
-        # e^(t omega), by Rodrigues' formula.
-        along = t * np.sinc(t * (angle / np.pi))
-        twice = 0.5 * (t * np.sinc(t * (0.5 * angle / np.pi))) ** 2
-        R = np.eye(3) + along[:, None, None] * omega + twice[:, None, None] * (omega @ omega)
-        grown = np.exp(t[:, None] * stretch - (k * np.sin(np.pi * t))[:, None])
-        last = V.T @ self.start.frame
-        F = R @ (V * grown[:, None, :]) @ last
-        rate = stretch - (k * np.pi * np.cos(np.pi * t))[:, None]
-        dF = omega @ F + R @ (V * (grown * rate)[:, None, :]) @ last
+        F, dF = self._linear.at(t, k)
         c, dc = self._center(t)
         return c, F, dc, dF
 

@@ -37,6 +37,31 @@ class Mapped:
         self.points[rows], self.jacobian[rows] = points, jacobian
 
 
+class InnerMap(Protocol):
+    """phi: the region that a deformed inner cage holds, exactly onto the canonical one."""
+
+    def __call__(self, points: Array) -> tuple[Mask, Array, Array]:
+        """(inside [N], phi(p) [M,3], J [M,3,3]) of deformed points [N,3]; M counts those inside."""
+
+    @property
+    def inverse(self) -> InnerMap:
+        """The map of the canonical region onto the deformed one."""
+
+
+@dataclass(frozen=True)
+class NoInnerMap:
+    """The inner map of a cage whose inside has no map of its own: it holds no point."""
+
+    def __call__(self, points: Array) -> tuple[Mask, Array, Array]:
+        """No point of [N,3] is inside."""
+        return np.zeros(len(points), dtype=bool), np.zeros((0, 3)), np.zeros((0, 3, 3))
+
+    @property
+    def inverse(self) -> NoInnerMap:
+        """Itself."""
+        return self
+
+
 class Shell(Protocol):
     """A map of V^o minus V onto V^o minus V^c: equal to phi on the faces of V, the identity on those of V^o.
 

@@ -12,7 +12,7 @@ from cagefield.edits.device.kernels.edit_lattice import sample_lattice
 from cagefield.edits.device.packing import pack_warp
 from cagefield.errors import EditError
 from cagefield.files import memory
-from cagefield.warps import flow_lattice
+from cagefield.warps import FreeFormFlow, LatticeShell, flow_lattice
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.lattice import Lattice
@@ -35,6 +35,9 @@ interpolation's own, worst of the edits, in the mean and in the largest error:
     128^3     29% and 33%  4% and 9%    4% and 2%    0% and 0%
 """
 
+FREE_FORM_STRAIN = 0.5
+"""Strain of a step (see `warps.free_form`) of a flow whose inner cage is no hexahedron."""
+
 
 def sample_nodes(warp: ContinuousWarp, resolution: int) -> NDArray[np.float32]:
     """The nodes [R^3,3] of a continuous map's lattice, displacements in world units, x fastest.
@@ -47,6 +50,10 @@ def sample_nodes(warp: ContinuousWarp, resolution: int) -> NDArray[np.float32]:
     if isinstance(warp.shell, FlowShell):
         strain = LATTICE_STRAIN * min(1.0, (32.0 / resolution) ** 0.5)
         return flow_lattice.sample(warp.shell.with_strain(strain), resolution)
+    if isinstance(warp.shell, LatticeShell):
+        return warp.shell.sample(resolution)
+    if isinstance(warp.shell, FreeFormFlow):
+        return warp.shell.with_strain(FREE_FORM_STRAIN).sample(resolution, warp.inner)
     nodes = np.empty((resolution**3, 3), dtype=np.float32)
     if not isinstance(warp.shell, TrilinearShell):  # no kernel: from the reference
         lattice = Lattice.sample(lambda p: warp.to_canonical(p).points, warp.outer, resolution)

@@ -32,7 +32,7 @@ FLOW = -1.0
 OFFSET = 10  # first lattice node, or table's entry, as 65536 * [10] + [11]: a float32 counts to 2^24 only
 TO_NODES = 12  # origin [3] and matrix [3,3] of the lattice, node units
 NODE_BOX = 24  # min, max of the outer cage in node units, where it is a parallelepiped
-SIMPLE = 30  # 1 where phi is affine, V and V^o are parallelepipeds, and the shell is a lattice
+SIMPLE = 30  # 1 where V, if it has a record, and V^o are parallelepipeds, phi is affine, the shell a lattice
 ALONE = 31  # 1 where no earlier edit reaches into the edit's box, or that of V^c where V shows the field
 UNDER_PLACE = 32  # where samples of a discrete edit's region are read: `EMPTY_PLACE`, or the place of a layer
 PART_PLACE = (
@@ -78,8 +78,9 @@ def _pack_discrete(row: NDArray[np.float32], warp: DiscreteWarp) -> None:
 
 
 def _pack_continuous(row: NDArray[np.float32], warp: ContinuousWarp, lattice: int | None) -> None:
-    row[FIRST], row[LAST], row[CONTINUOUS] = 0, 2, 1
-    _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
+    row[FIRST], row[LAST], row[CONTINUOUS] = int(warp.hexahedra is None), 2, 1
+    if warp.hexahedra is not None:
+        _record(row, 0, warp.hexahedra.deformed.corners, warp.hexahedra.canonical.corners)
     _record(row, 1, warp.outer.corners)
     if isinstance(warp.shell, TrilinearShell):
         row[LAST] = 8
@@ -94,7 +95,8 @@ def _pack_continuous(row: NDArray[np.float32], warp: ContinuousWarp, lattice: in
         row[RESOLUTION] = lattice
         row[NODE_BOX : NODE_BOX + 3] = -EDGE * lattice
         row[NODE_BOX + 3 : NODE_BOX + 6] = lattice - 1 + EDGE * lattice
-        row[SIMPLE] = row[RECORDS + AFFINE] == 1.0 and warp.outer.is_affine
+        is_straight = warp.hexahedra is None or row[RECORDS + AFFINE] == 1.0
+        row[SIMPLE] = is_straight and warp.outer.is_affine
     elif isinstance(warp.shell, FlowShell):
         row[RESOLUTION] = FLOW
 

@@ -138,7 +138,7 @@ def _set_cages(edit: Edit, target: Target, operation: Operation) -> Edit:
     outer = settings.outer
     if outer is not None and target == "outer":
         outer = operation.apply(outer)
-    elif outer is not None and target == "both":
+    elif outer is not None and target == "both" and not outer.follows_edit:
         about = operation.apply(Cage(outer.corners, pivot=edit.inner.pivot))
         outer = Cage(about.corners)
     return edit.replace(inner=inner).with_shell_settings(replace(settings, outer=outer))

@@ -23,23 +23,14 @@ def mirror_edit(edit: Edit, axis: int, at: float) -> Edit:
     """The edit across the plane where coordinate `axis` is `at`."""
     settings = edit.shell_settings
     if settings.outer is not None:
-        settings = replace(settings, outer=mirrored_cage(settings.outer, axis, at))
+        settings = replace(settings, outer=settings.outer.mirrored(axis, at))
     return edit.with_shell_settings(settings).replace(
-        inner=mirrored_cage(edit.inner, axis, at),
-        operations=tuple(mirrored_operation(operation, axis) for operation in edit.operations),
+        inner=edit.inner.mirrored(axis, at),
+        operations=tuple(mirrored_operation(operation, axis, edit.inner) for operation in edit.operations),
     )
 
 
-def mirrored_cage(cage: Cage, axis: int, at: float) -> Cage:
-    """The cage across the plane where coordinate `axis` is `at`."""
-    corners = cage.corners[[k ^ 1 << axis for k in range(8)]].copy()
-    pivot = cage.pivot.copy()
-    corners[:, axis] = 2.0 * at - corners[:, axis]
-    pivot[axis] = 2.0 * at - pivot[axis]
-    return Cage(corners, pivot=pivot)
-
-
-def mirrored_operation(operation: Operation, axis: int) -> Operation:
+def mirrored_operation(operation: Operation, axis: int, cage: Cage) -> Operation:
     """Operation on the mirrored cage that corresponds to `operation` on the cage."""
     if isinstance(operation, ops.Translate):
         return ops.Translate(_flipped(operation.by, axis))
@@ -55,15 +46,37 @@ def mirrored_operation(operation: Operation, axis: int) -> Operation:
         factors = operation.factors.items()
         values = {pair: -value if name in pair and value else value for pair, value in factors}
         return ops.Shear(**values, axes=operation.axes)
+    if isinstance(operation, ops.Bend | ops.Twist | ops.Taper):
+        return _mirrored_along_axis(operation, "xyz"[axis])
     by = _flipped(operation.by, axis)
     if isinstance(operation, ops.MoveCorner):
         return ops.MoveCorner(operation.corner ^ 1 << axis, by)
     if isinstance(operation, ops.MoveEdge):
         i, j = sorted(k ^ 1 << axis for k in operation.edge)
         return ops.MoveEdge((i, j), by)
+    if isinstance(operation, ops.MovePoint):
+        return ops.MovePoint(cage.mirrored_handle(operation.point, axis), by)
+    if isinstance(operation, ops.MovePoints):
+        points = tuple(cage.mirrored_handle(k, axis) for k in operation.points)
+        return replace(operation, points=points, by=by)
     if isinstance(operation, ops.MoveFace):
         return ops.MoveFace(_other_face(operation.face, axis), by)
     return ops.MoveCorners(tuple(k ^ 1 << axis for k in operation.corners), by)
+
+
+def _mirrored_along_axis(operation: ops.Bend | ops.Twist | ops.Taper, mirrored: str) -> Operation:
+    """A bend, twist or taper of a lattice whose own axis `mirrored` is numbered the other way."""
+    ends = {"start": "end", "middle": "middle", "end": "start"}
+    fixed = ends[operation.fixed] if operation.axis == mirrored else operation.fixed
+    if isinstance(operation, ops.Twist):
+        return replace(operation, degrees=-operation.degrees, fixed=fixed)
+    if isinstance(operation, ops.Taper):
+        factor = 1.0 / operation.factor if operation.axis == mirrored else operation.factor
+        return replace(operation, factor=factor, fixed=fixed)
+    towards = operation.towards or "yzx"["xyz".index(operation.axis)]
+    return replace(
+        operation, degrees=-operation.degrees if towards == mirrored else operation.degrees, fixed=fixed
+    )
 
 
 def _other_face(face: str, axis: int) -> str:

@@ -32,7 +32,7 @@ from cagefield.server.editor.mirror import mirror_edit
 from cagefield.server.editor.pasting import crop_paste
 from cagefield.server.editor.path_edits import edits_at_time
 from cagefield.server.editor.path_preview import Preview
-from cagefield.server.editor.validity import problem
+from cagefield.server.editor.validity import check_has_corners, problem
 from cagefield.typing import Array
 
 LATTICE = 64
@@ -202,6 +202,7 @@ class Session:
         if which == "outer":
             edit = with_outer(edit, cage)
         else:
+            check_has_corners(edit)
             edit = crop_paste(edit, cage) if isinstance(edit, Paste) else edit.replace(inner=cage)
         self._put(f"Set {which} cage{suffix_for(entry)}", replace(entry, edit=edit))
 
@@ -219,6 +220,7 @@ class Session:
     def fit_inner(self, number: int, inner: Cage) -> None:
         """The inner cage as it was fitted to its content."""
         entry = self._unlocked(number)
+        check_has_corners(entry.edit)
         if isinstance(entry.edit, Paste):
             inner = Cage(inner.corners, pivot=entry.edit.inner.pivot)
         self._put(f"Fit inner cage{suffix_for(entry)}", replace(entry, edit=entry.edit.replace(inner=inner)))
@@ -425,7 +427,7 @@ class Session:
 
     def _push(self, name: str, document: Document) -> None:
         shown = (entry.edit for entry in document.entries if entry.edit.enabled)
-        too_large = problem_of_lattices(edit.lattice for edit in shown if isinstance(edit, Continuous))
+        too_large = problem_of_lattices(edit.kernel_lattice for edit in shown if isinstance(edit, Continuous))
         if too_large is not None:
             raise EditError(too_large)
         self.preview = None

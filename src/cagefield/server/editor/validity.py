@@ -17,9 +17,15 @@ def problem(edit: Edit) -> str | None:
     if not isinstance(edit, Continuous):
         return None
     outer = edit.outer
-    if not outer.contains([*edit.inner.corners, *edit.deformed.corners]).all():
+    if not outer.contains([*edit.inner.handles, *edit.deformed.handles]).all():
         return OUTSIDE_MESSAGE
     return FOLDED if isinstance(edit.shell, Trilinear) else CLOSE
+
+
+def check_has_corners(edit: Edit) -> None:
+    """Raise `EditError` for an edit whose inner cage is not placed by 8 corners."""
+    if not edit.inner.is_hexahedron:
+        raise edit.error(f"{edit.inner.plural_noun} are not placed by corners; move them with the gizmo")
 
 
 def cause(reason: str) -> str:

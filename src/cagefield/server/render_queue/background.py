@@ -102,7 +102,8 @@ class BackgroundWork:
     def _unmeasured(self) -> Edit | None:
         if self._session.moving:
             return None
-        edits = (edit for edit in self._session.drawn() if isinstance(edit, Continuous) and edit.lattice)
+        shown = (edit for edit in self._session.drawn() if isinstance(edit, Continuous))
+        edits = (edit for edit in shown if edit.kernel_lattice)
         return next((edit for edit in edits if edit not in self._errors), None)
 
     def _measure(self, edit: Edit, generation: int) -> BackgroundTask:

@@ -116,7 +116,7 @@ class EditedRenderers:
 
     def _quickly(self, edit: Edit) -> Edit:
         """The edit with a coarser lattice, kept as long as the edit is."""
-        if not isinstance(edit, Continuous) or (edit.lattice or 512) <= QUICK_LATTICE:
+        if not isinstance(edit, Continuous) or (edit.kernel_lattice or 512) <= QUICK_LATTICE:
             return edit
         if edit in self._coarse:
             return self._coarse[edit]

@@ -210,7 +210,7 @@ class RendererCache:
 
 def _lattice_bytes(edit: Edit) -> int:
     """Bytes of the lattice of an edit, whether it has been made or not."""
-    return 12 * (edit.lattice or 0) ** 3 if isinstance(edit, Continuous) else 0
+    return 12 * (edit.kernel_lattice or 0) ** 3 if isinstance(edit, Continuous) else 0
 
 
 def _warm_splats(stage: WarmStage) -> None:

@@ -79,7 +79,7 @@ def map_edit(
     at = vec3(0.0, 0.0, 0.0)
     if params[e, SIMPLE] > 0.5:
         y = times(params, e, RECORDS + MATRIX, p - read3(params, e, RECORDS + CENTER))
-        if qd.abs(y).max() <= 1.0 + EDGE:
+        if first == 0 and qd.abs(y).max() <= 1.0 + EDGE:
             hit = 0
             at = qd.max(qd.min(y, 1.0), -1.0)
         elif in_box(to_nodes(p, params, e), params, e, NODE_BOX):

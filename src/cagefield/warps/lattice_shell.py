@@ -1,0 +1,338 @@
+"""The map of a lattice cage: its spline inside, a flow around it that meets the spline exactly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cagefield.geometry import bspline_lattice, hexahedron
+from cagefield.geometry.cage import Cage, LatticeCage
+from cagefield.typing import Array, Float32, Mask
+from cagefield.warps.cage_maps import flow_between, inner_map_between
+from cagefield.warps.falloff import Falloff
+from cagefield.warps.interfaces import InnerMap, NoInnerMap
+from cagefield.warps.lattice_flow import LatticeFlow, outer_distance, outer_distance_gradient
+from cagefield.warps.lattice_way import Piece, pieces_between
+from cagefield.warps.newton_inverse import inverted
+
+GRIDS: tuple[int, ...] = (20, 32, 48)
+"""Cells of the velocity's grid along each axis of the outer cage, tried one after the other."""
+
+MOST_CORRECTION = 0.9
+"""Most slope of rho r: below 1 the correction is one to one."""
+
+LEAST_GAP = 2e-3
+"""The gap between the lattice and the outer cage, as a share of the outer cage's half-width."""
+
+_CHUNK = 65_536
+
+
+@dataclass(frozen=True)
+class LatticeShell:
+    """phi and phi' of a lattice in an outer cage; valid in all of V^o, the identity on its faces.
+
+    Inside, phi = L^-1, with L the spline of the deformed control points over that of the canonical ones, an
+    even grid. Around it,
+
+        to_deformed(X) = Phi(R(X)),    R(X) = X + rho(X) r(clamp X),    r(s) = Phi^-1(L(s)) - s,
+
+    with clamp X the nearest point (in u) of the canonical cage, rho = g^2 (3 - 2 g), g = d_o / (d_i + d_o), 1
+    on the cage and 0 on the outer one, and Phi a flow that follows the lattice on its way (`LatticeFlow`). So
+    the map equals L on the lattice's faces whatever Phi is; the better Phi follows, the less is left to r.
+
+    One to one: L and its way by Bernstein coefficients, Phi step by step by a bound of its slope, R where the
+    slope of rho r is below 1, which is sampled (`Surroundings.slope`), not proven.
+
+    Parameters: the canonical and the deformed inner cage, the outer cage, the falloff.
+    """
+
+    inner: LatticeCage
+    deformed: LatticeCage
+    outer: Cage
+    falloff: Falloff
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...] | None:
+        """The way of the lattice, see `pieces_between`."""
+        return pieces_between(self.inner, self.deformed)
+
+    @cached_property
+    def around(self) -> Surroundings:
+        """The flow and its correction, on the coarsest grid that suffices, else on the finest."""
+        assert self.pieces is not None
+        for cells in GRIDS:
+            flow = LatticeFlow(self.pieces, self.outer, self.falloff, cells)
+            around = Surroundings(self.inner, self.deformed, flow)
+            if flow.is_one_to_one and around.slope <= MOST_CORRECTION:
+                break
+        return around
+
+    def to_deformed(self, points: Array) -> tuple[Array, Array]:
+        """(deformed points [N,3], Jacobians [N,3,3]) of canonical points [N,3] in V^o."""
+        around = self.around
+        u = around.material(points)
+        inside = hexahedron.all_three((u >= 0.0) & (u <= 1.0))
+        moved, J = np.empty_like(points), np.empty((len(points), 3, 3))
+        moved[inside], J[inside] = around.lattice(u[inside])
+        rest = points[~inside]
+        if len(rest):
+            change, slope = around.correction(rest)
+            moved[~inside], onward = around.flowed(rest + change, backwards=False)
+            J[~inside] = onward @ (np.eye(3) + slope)
+        return moved, J
+
+    def to_canonical(self, points: Array) -> tuple[Array, Array]:
+        """(canonical points [N,3], Jacobians [N,3,3]) of deformed points [N,3] in V^o."""
+        around = self.around
+        A, b = self.inner.affine
+        q, back = around.flowed(points, backwards=True)
+        u, inside = around.inverted(points, q)
+        moved, J = np.empty_like(points), np.empty((len(points), 3, 3))
+        moved[inside] = b + u[inside] @ A.T
+        J[inside] = hexahedron.invert(around.lattice(u[inside])[1])
+        outside = np.flatnonzero(~inside)
+        if len(outside):
+            X = around.uncorrected(q[outside])
+            moved[outside] = X
+            J[outside] = hexahedron.invert(np.eye(3) + around.correction(X)[1]) @ back[outside]
+        return moved, J
+
+    def sample(self, resolution: int) -> Float32:
+        """Displacements to canonical space [R^3,3], x fastest, of the nodes of a `Lattice`."""
+        if not self.outer.is_affine:
+            return self._sampled_exactly(resolution)
+        from cagefield.warps.kernels.lattice_nodes import sample_nodes
+
+        around, flow = self.around, self.around.flow
+        A, b = self.inner.affine
+        out = np.empty((resolution**3, 3), dtype=np.float32)
+        origin, frame = self.outer.frame
+        padded = np.zeros((*flow.velocities.shape[:-1], 4), dtype=np.float32)
+        padded[..., :3] = flow.velocities
+        confines, heights = flow.confines, flow.confines.heights
+        outer = (confines.center[None], confines.inverse, confines.frame, heights[None])
+        frames = np.concatenate([*outer, b[None], np.linalg.inv(A), A, origin[None], frame])
+        sample_nodes(
+            padded.reshape(-1),
+            np.uintp(flow.cells + 1),
+            flow.steps,
+            frames,
+            around.padded,
+            self.deformed.interpolation == "linear",
+            around.face_table,
+            1.5 * around.largest + 1e-9,
+            resolution,
+            out,
+        )
+        return out
+
+    def _sampled_exactly(self, resolution: int) -> Float32:
+        origin, frame = self.outer.frame
+        nodes = origin + bspline_lattice.grid(3 * (resolution,)) @ frame.T
+        out = np.zeros((len(nodes), 3), dtype=np.float32)
+        rows = np.flatnonzero(self.outer.contains(nodes))
+        for first in range(0, len(rows), _CHUNK):
+            part = rows[first : first + _CHUNK]
+            out[part] = self.to_canonical(nodes[part])[0] - nodes[part]
+        return out
+
+    def least_ratio(self) -> float:
+        """Least det of d(deformed)/d(canonical) at 4096 points of the outer cage: a sample, not a bound."""
+        origin, frame = self.outer.frame
+        points = origin + np.random.default_rng(0).random((4096, 3)) @ frame.T
+        points = points[self.outer.contains(points)]
+        return float(np.linalg.det(self.to_deformed(points)[1]).min())
+
+    def problem(self) -> str | None:
+        """Why the map is not one to one, in words that continue "the flow shell ...", or None."""
+        if not self.inner.is_affine:
+            return (
+                "cannot surround the lattice: before any operation its control points must lie evenly in a"
+                " box (or a parallelepiped); move them by operations instead"
+            )
+        for lattice, when in ((self.inner, " before any operation"), (self.deformed, "")):
+            u, found = hexahedron.inverse(self.outer.corners, lattice.control_points)
+            gap = float(np.where(found, 1.0 - np.abs(2.0 * u - 1.0).max(axis=1), -1.0).min())
+            if gap < LEAST_GAP:
+                return (
+                    f"has no room{when}: the gap between the lattice and the outer cage is {gap:.2g} of the"
+                    f" outer cage's half-width and must be at least {LEAST_GAP:g} on every side"
+                )
+        if self.deformed.has_shape_of(self.inner):
+            return None
+        if self.pieces is None:
+            return "finds no way for the lattice that is proven not to fold"
+        if not self.around.flow.is_one_to_one:
+            return "is strained too much: the lattice moves too far for its gap to the outer cage"
+        if self.around.slope > MOST_CORRECTION:
+            return "cannot follow the lattice closely enough: it is bent too much for the room around it"
+        return None
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """Phi and R of a `LatticeShell`, and what its lattice is on both sides."""
+
+    inner: LatticeCage
+    deformed: LatticeCage
+    flow: LatticeFlow
+
+    def material(self, points: Array) -> Array:
+        """u [N,3] of canonical points [N,3], in the inner cage's affine coordinates."""
+        A, b = self.inner.affine
+        return np.asarray((points - b) @ np.linalg.inv(A).T)
+
+    @cached_property
+    def padded(self) -> Array:
+        """Padded control points of the deformed lattice, as kernels take them."""
+        return bspline_lattice.padded(self.deformed.control_points, self.deformed.shape)
+
+    def lattice(self, u: Array) -> tuple[Array, Array]:
+        """(L [N,3], its Jacobians by canonical points [N,3,3]) at u [N,3]."""
+        from cagefield.warps.kernels.lattice_flow import lattice_points
+
+        x, J = np.empty_like(u), np.empty((len(u), 3, 3))
+        lattice_points(self.padded, self.deformed.interpolation == "linear", np.ascontiguousarray(u), x, J)
+        return x, J @ np.linalg.inv(self.inner.affine[0])
+
+    def flowed(self, points: Array, *, backwards: bool) -> tuple[Array, Array]:
+        """(Phi or Phi^-1 of points [N,3] in V^o, Jacobians [N,3,3])."""
+        z = self._in_outer(points)
+        moved, J = self.flow.through(z, backwards=backwards)
+        corners = self.flow.outer.corners
+        ends = (
+            hexahedron.jacobian(corners, 0.5 * (moved + 1.0)),
+            hexahedron.jacobian(corners, 0.5 * (z + 1.0)),
+        )
+        J = ends[0] @ J @ hexahedron.invert(ends[1])
+        return hexahedron.points(corners, 0.5 * (moved + 1.0)), J
+
+    def _in_outer(self, points: Array) -> Array:
+        """z [N,3] of points [N,3] in V^o, cut to it."""
+        confines = self.flow.confines
+        if confines.is_affine:
+            return np.asarray(((points - confines.center) @ confines.inverse.T).clip(-1.0, 1.0))
+        u, _ = hexahedron.inverse(self.flow.outer.corners, points)
+        return np.asarray((2.0 * u - 1.0).clip(-1.0, 1.0))
+
+    def residual(self, u: Array) -> tuple[Array, Array]:
+        """(r [N,3], dr/dX [N,3,3]) at points of the canonical cage's faces, u [N,3]."""
+        A, b = self.inner.affine
+        x, D = self.lattice(u)
+        back, J = self.flowed(x, backwards=True)
+        return back - (b + u @ A.T), J @ D - np.eye(3)
+
+    def correction(self, X: Array) -> tuple[Array, Array]:
+        """(rho(X) r(clamp X) [N,3], its Jacobian [N,3,3]) at canonical points X [N,3] around the cage."""
+        r, dr = self.residual(self.material(X).clip(0.0, 1.0))
+        return self._faded(X, r, dr)
+
+    def _faded(self, X: Array, r: Array, dr: Array) -> tuple[Array, Array]:
+        A, _ = self.inner.affine
+        u = self.material(X)
+        rho, drho = self._rho(X, u)
+        within = ((u >= 0.0) & (u <= 1.0)).astype(np.float64)
+        clamp_slope = (A * within[:, None]) @ np.linalg.inv(A)
+        return rho[:, None] * r, r[:, :, None] * drho[:, None] + rho[:, None, None] * (dr @ clamp_slope)
+
+    def _rho(self, X: Array, u: Array) -> tuple[Array, Array]:
+        """(rho [N], its gradient [N,3])."""
+        A, _ = self.inner.affine
+        offset = (u - u.clip(0.0, 1.0)) @ A.T
+        d_i = np.linalg.norm(offset, axis=1)
+        beyond = ((u < 0.0) | (u > 1.0)).astype(np.float64)
+        towards = offset / np.maximum(d_i, 1e-300)[:, None]
+        grad_i = (towards[:, None] @ ((A * beyond[:, None]) @ np.linalg.inv(A)))[:, 0]
+        z = self._in_outer(X)
+        d_o = outer_distance(self.flow.confines, z)
+        grad_o = outer_distance_gradient(self.flow.confines, z, d_o)
+        total = np.maximum(d_i + d_o, 1e-300)
+        g = d_o / total
+        grad_g = (d_i[:, None] * grad_o - d_o[:, None] * grad_i) / (total * total)[:, None]
+        return g * g * (3.0 - 2.0 * g), 6.0 * (g * (1.0 - g))[:, None] * grad_g
+
+    def inverted(self, points: Array, q: Array) -> tuple[Array, Mask]:
+        """(u [N,3], inside [N]) of deformed points [N,3], with q = Phi^-1 of them: inside are those of V."""
+        from cagefield.warps.kernels.lattice_flow import invert_lattice
+
+        A, _ = self.inner.affine
+        u = self.material(q)
+        clamped = u.clip(0.0, 1.0)
+        away = np.linalg.norm((u - clamped) @ A.T, axis=1)
+        inside = np.zeros(len(points), dtype=bool)
+        near = np.flatnonzero(away <= 1.5 * self.largest + 1e-9)
+        start, found = np.ascontiguousarray(clamped[near]), np.zeros(len(near), dtype=bool)
+        linear, enough = self.deformed.interpolation == "linear", 1e-13 * np.abs(points).max(initial=1e-300)
+        invert_lattice(self.padded, linear, np.ascontiguousarray(points[near]), start, enough, found)
+        u[near] = start
+        inside[near] = found & hexahedron.all_three((start >= -1e-12) & (start <= 1.0 + 1e-12))
+        return u.clip(0.0, 1.0), inside
+
+    def uncorrected(self, q: Array) -> Array:
+        """X [N,3] with R(X) = q [N,3], by Newton's method."""
+
+        def corrected(X: Array) -> tuple[Array, Array]:
+            change, slope = self.correction(X)
+            return X + change, np.eye(3) + slope
+
+        return inverted(corrected, q, q, float(np.abs(self.flow.outer.corners).max()))[0]
+
+    # ---- samples of the faces ----
+
+    @cached_property
+    def face_table(self) -> Array:
+        """r [6,T,T,3] at even nodes of the canonical cage's faces -x, +x, -y, +y, -z, +z."""
+        n = int(np.clip(8 * (max(self.deformed.shape) - 1), 24, 48)) + 1
+        b, c = (g.ravel() for g in np.meshgrid(*2 * (np.linspace(0.0, 1.0, n),), indexing="ij"))
+        u = np.empty((6, n * n, 3))
+        for axis in range(3):
+            for side in range(2):
+                face = u[2 * axis + side]
+                face[:, axis], face[:, (axis + 1) % 3], face[:, (axis + 2) % 3] = side, b, c
+        A, b = self.inner.affine
+        on_faces = u.reshape(-1, 3)
+        z, _ = self.flow.through(
+            self._in_outer(self.lattice(on_faces)[0]), backwards=True, slopes=False, enough=1e-6
+        )
+        back = hexahedron.points(self.flow.outer.corners, 0.5 * (z + 1.0))
+        return np.asarray((back - (b + on_faces @ A.T)).reshape(6, n, n, 3))
+
+    @cached_property
+    def _samples(self) -> tuple[Array, Array, Array]:
+        """(u [S,3] of an even grid on the canonical cage's faces, r [S,3], dr/dX [S,3,3] there)."""
+        u = bspline_lattice.grid((15, 15, 15))
+        u = u[(np.abs(u - 0.5) == 0.5).any(axis=1)]
+        return u, *self.residual(u)
+
+    @cached_property
+    def largest(self) -> float:
+        """Largest |r| at samples of the canonical cage's faces."""
+        return float(np.linalg.norm(self._samples[1], axis=1).max())
+
+    @cached_property
+    def slope(self) -> float:
+        """Largest |d(rho r)/dX| (Frobenius norm) at 4 distances from each face sample."""
+        u, r, dr = self._samples
+        A, b = self.inner.affine
+        outwards = np.where(np.abs(u - 0.5) == 0.5, u - 0.5, 0.0)
+        outwards /= np.abs(outwards).max(axis=1, keepdims=True)
+        lengths = np.linalg.norm(outwards @ A.T, axis=1)
+        z, dz = self._in_outer(b + u @ A.T), outwards @ A.T @ self.flow.confines.inverse.T
+        room = ((1.0 - z * np.sign(dz)) / np.maximum(np.abs(dz), 1e-9)).min(axis=1) * lengths
+        most = 0.0
+        for share in (1e-3, 0.15, 0.35, 0.6):
+            X = b + (u + outwards * (share * room / lengths)[:, None]) @ A.T
+            most = max(most, float(np.linalg.norm(self._faded(X, r, dr)[1], axis=(1, 2)).max()))
+        return most
+
+
+@flow_between.register
+def _(inner: LatticeCage, deformed: LatticeCage, outer: Cage, falloff: Falloff) -> LatticeShell:
+    return LatticeShell(inner, deformed, outer, falloff)
+
+
+@inner_map_between.register
+def _(inner: LatticeCage, deformed: Cage) -> InnerMap:
+    return NoInnerMap()  # the shell holds the map inside, too
