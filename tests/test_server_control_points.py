@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.edits import Edit, EditStack, MovePoint, Rotate, Translate, dump_edits, parse_edits
+from cagefield.edits import Bend, Edit, EditStack, MovePoint, Rotate, Translate, dump_edits, parse_edits
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
 from cagefield.geometry.reach_cage import ReachCage
 from cagefield.server.editor.document import Document
+from cagefield.server.editor.drag_solver import appended
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol.conversion import edit_state
 
@@ -93,3 +94,11 @@ def test_a_document_of_control_points_is_saved_and_read() -> None:
     stack = EditStack(entry.edit for entry in s.document.entries)
     for kind in ("yaml", "json"):
         assert parse_edits(dump_edits(stack, format=kind), format=kind) == stack
+
+
+def test_moves_of_one_point_are_joined_and_bends_are_not() -> None:
+    moves = appended((MovePoint(0, (0.1, 0.0, 0.0)),), MovePoint(0, (0.0, 0.2, 0.0)))
+    assert moves == (MovePoint(0, (0.1, 0.2, 0.0)),)
+    others = appended(moves, MovePoint(1, (0.0, 0.2, 0.0)))
+    assert len(others) == 2
+    assert len(appended((Bend("z", 10.0),), Bend("z", 5.0))) == 2

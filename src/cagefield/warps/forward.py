@@ -39,10 +39,12 @@ def to_deformed(
     `coarse` takes a flow shell with long steps. `proceed` is called now and then, and gives the map up by
     raising.
     """
-    if isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell | FreeFormFlow):
+    if isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell):
         shell = warp.shell.with_strain(COARSE_STRAIN) if coarse else warp.shell
-        is_free_form = isinstance(shell, FreeFormFlow)
-        warp = replace(warp, shell=_FreeFormForward(shell) if is_free_form else _ForwardFlow(shell, coarse))
+        warp = replace(warp, shell=_ForwardFlow(shell, coarse))
+    elif isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FreeFormFlow):
+        flow = warp.shell.with_strain(COARSE_STRAIN) if coarse else warp.shell
+        warp = replace(warp, shell=_FreeFormForward(flow))
     parts = []
     for first in range(0, max(len(points), 1), POINTS_PER_STEP):
         if proceed is not None:

@@ -24,7 +24,18 @@ from cagefield.warps.interfaces import InnerMap
 from cagefield.warps.newton_inverse import inverted
 
 EXACT_STEP_STRAIN = 0.25
-"""Integral of L over a step, at most."""
+"""Integral of L over a step, at most.
+
+Of 60 random edits of control points (radius .5, scene of about 2), the largest errors: of the map by steps to
+deformed space against the inverse of that to canonical space, and of the map to canonical space itself.
+
+    strain     0.5               0.25              0.125
+    smooth     9e-6 and 8e-5     7e-7 and 2e-5     4e-8 and 3e-6
+    sphere     8e-6 and 7e-5     5e-7 and 1e-5     9e-9 and 1e-6
+    root       2e-4 and 5e-4     1e-5 and 5e-5     3e-7 and 6e-6
+    sharp      2e-5 and 2e-5     6e-7 and 3e-6     2e-8 and 3e-7
+    linear     7e-5 and 6e-4     2e-5 and 4e-4     2e-5 and 3e-4
+"""
 
 PROVEN = 0.69
 """Most h L of a step that is proven to be one to one; see above."""

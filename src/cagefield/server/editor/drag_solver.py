@@ -76,7 +76,7 @@ def appended(operations: tuple[Operation, ...], last: Operation) -> tuple[Operat
 
 def _sum(first: Operation, second: Operation) -> Operation | None:
     """One operation in place of two moves of the same corners or of the whole cage; None for any others."""
-    turning = (ops.Rotate, ops.Scale, ops.Shear)
+    turning = ops.Rotate | ops.Scale | ops.Shear | ops.Bend | ops.Twist | ops.Taper
     if isinstance(first, turning) or isinstance(second, turning) or type(first) is not type(second):
         return None
     x, y, z = (a + b for a, b in zip(first.by, second.by, strict=True))
