@@ -26,6 +26,7 @@ from cagefield.training.splats.kernels import device_backward, device_gauss_newt
 from cagefield.training.splats.kernels.device_args import AverageArgs, ParameterArgs, PhotoArgs
 from cagefield.training.splats.kernels.device_args import StepArgs as DeviceStepArgs
 from cagefield.training.splats.kernels.gauss_newton_splats import StepArgs
+from cagefield.training.splats.kernels.ssim import MOMENT_PLANES
 from cagefield.training.splats.pose_optimization import pose_sums
 from cagefield.training.splats.splat_optimizer import Photo
 from cagefield.training.splats.splat_state import SplatState
@@ -138,7 +139,7 @@ class DeviceSplatOptimizer:
             self._color,
             self._photo,
             weight,
-            self._buffers.take("moments", 3 * device_ssim.MOMENT_PLANES * size),
+            self._buffers.take("moments", 3 * MOMENT_PLANES * size),
             self._buffers.take("by_moment", 9 * size),
             self._buffers.take("pixels", 6 * size),
             self._slopes,
