@@ -39,7 +39,7 @@ class VoxelConfig:
         curvature_decay: decay of the running curvatures, per batch that meets the voxel.
         damping: constant added to every curvature.
         max_step: maximum change of a voxel's optical depth in one step.
-        laplacian_reg: weight of the Laplacian regularization; None takes 2e-5, or 2e-3 for an unbounded
+        laplacian_reg: weight of the Laplacian regularization; None takes 1e-5, or 1e-3 for an unbounded
             capture.
         view_dependence_reg: weight of the penalty on view-dependent color coefficients, relative to the
             evidence of the photos; colors seen from one side alone then extrapolate to the other sides. None
