@@ -15,7 +15,13 @@ from cagefield.server.editor.cage_placement import fit_to_content
 from cagefield.server.editor.edit_texts import read_edits
 from cagefield.server.editor.pasting import build_paste
 from cagefield.server.editor.session import Session
-from cagefield.server.protocol import client_messages, common, selection_messages, server_messages
+from cagefield.server.protocol import (
+    client_messages,
+    common,
+    point_messages,
+    selection_messages,
+    server_messages,
+)
 from cagefield.server.protocol.conversion import (
     cage_of,
     camera_of,
@@ -240,6 +246,24 @@ class MessageHandlers:
         x, y = (0.5, 0.5) if message.x is None or message.y is None else (message.x, message.y)
         point, height = await self._seen(x, y, anywhere=anywhere)
         self._session.place(point, height)
+        self._coordinator.changed()
+
+    @_handles(point_messages.PlacePoint)
+    async def _place_point(self, message: point_messages.PlacePoint) -> None:
+        anywhere = message.x is None or message.y is None
+        x, y = (0.5, 0.5) if message.x is None or message.y is None else (message.x, message.y)
+        point, height = await self._seen(x, y, anywhere=anywhere)
+        self._session.place_point(point, height)
+        self._coordinator.changed()
+
+    @_handles(point_messages.Subdivide)
+    def _subdivide(self, message: point_messages.Subdivide) -> None:
+        self._session.subdivide(message.edit, message.cells, message.interpolation)
+        self._coordinator.changed()
+
+    @_handles(point_messages.PointReach)
+    def _point_reach(self, message: point_messages.PointReach) -> None:
+        self._session.point_reach(message.edit, message.radius, message.falloff)
         self._coordinator.changed()
 
     async def _seen(self, x: float, y: float, *, anywhere: bool) -> tuple[Array, float]:
