@@ -12,6 +12,9 @@ from cagefield.geometry.cage import Cage, LatticeCage
 from cagefield.geometry.cage_checks import point_numbers
 from cagefield.geometry.control_points import ControlPoints
 
+OF_CORNERS = (ops.MoveCorner, ops.MoveEdge, ops.MoveFace, ops.MoveCorners)
+"""Operations that a cage without corners does not have."""
+
 
 def check_operation(cage: Cage, operation: Operation) -> None:
     """Raise a `CagefieldError` with the cure where a cage has no such operation, or no such points."""
@@ -24,9 +27,8 @@ def check_operation(cage: Cage, operation: Operation) -> None:
             raise EditError(f"a {operation.noun} needs a lattice; subdivide the cage first (panel, Cages)")
         if isinstance(operation, ops.Bend) and operation.towards == operation.axis:
             raise EditError(f"a bend along {operation.axis} goes towards another axis; choose one")
-    elif isinstance(operation, ops.MoveCorner | ops.MoveEdge | ops.MoveFace | ops.MoveCorners):
-        if isinstance(cage, ControlPoints):
-            raise EditError("control points have no corners, edges or faces; move the points")
+    elif isinstance(cage, ControlPoints) and isinstance(operation, OF_CORNERS):
+        raise EditError("control points have no corners, edges or faces; move the points")
 
 
 def subdivided(edit: Edit, cells: tuple[int, int, int], interpolation: str) -> Edit:

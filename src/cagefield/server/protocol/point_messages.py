@@ -12,7 +12,7 @@ Cells: TypeAlias = Annotated[int, Field(ge=1, le=7)]
 
 
 class PlacePoint(Message):
-    """A new edit of one control point, on the surface seen at a pixel (x, y in [0,1] of the camera's picture).
+    """A new edit of one control point, on the surface seen at a pixel (x, y in [0,1] of the picture).
 
     Without a pixel it goes to the middle of the visible surface.
     """
