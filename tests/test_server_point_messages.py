@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from cagefield.edits import Bend, Edit, MovePoint, MovePoints, Taper, Translate, Twist
+from cagefield.edits import Bend, Edit, MovePoint, MovePoints, Taper, Translate, Trilinear, Twist
 from cagefield.edits.operations import Operation
 from cagefield.errors import CagefieldError, EditError
 from cagefield.geometry.bspline_lattice import INTERPOLATIONS
@@ -151,7 +151,7 @@ def test_a_cage_is_subdivided_with_its_operations() -> None:
 
 
 def test_edits_without_cells_are_refused() -> None:
-    trilinear = Edit.continuous(INNER, OUTER, shell="trilinear")
+    trilinear = Edit.continuous(INNER, OUTER, shell=Trilinear())
     s = session(FACE, Edit.move(INNER), trilinear)
     for number, words in ((1, "no cells"), (2, "only a continuous edit"), (3, "choose the flow shell")):
         with pytest.raises(EditError, match=words):

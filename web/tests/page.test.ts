@@ -168,7 +168,9 @@ describe("what is drawn", () => {
     expect(
       cageOverlay({ ...INITIAL, state: state({ edits: [moved] }) }, null, [], eye, forward).segments,
     ).toHaveLength(36);
-    expect(cageOverlay({ ...INITIAL, state: state(), mode: "set" }, null, [], eye, forward).dots).toHaveLength(18);
+    expect(
+      cageOverlay({ ...INITIAL, state: state(), mode: "set" }, null, [], eye, forward).dots,
+    ).toHaveLength(18);
   });
 
   it("has the other edits in their colors, hidden ones not, and nothing where cages are off or a page plays", () => {
@@ -187,7 +189,8 @@ describe("what is drawn", () => {
 
   it("has no handles where the edit is locked", () => {
     expect(
-      cageOverlay({ ...INITIAL, state: state({ edits: [edit({ locked: true })] }) }, null, [], eye, forward).dots,
+      cageOverlay({ ...INITIAL, state: state({ edits: [edit({ locked: true })] }) }, null, [], eye, forward)
+        .dots,
     ).toHaveLength(0);
   });
 });

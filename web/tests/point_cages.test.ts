@@ -19,7 +19,11 @@ import { expectClose } from "./cages";
 import { edit, state } from "./fake_server";
 
 const SHAPE: [number, number, number] = [2, 2, 3];
-const POINTS: Vec3[] = Array.from({ length: 12 }, (_, k) => [k % 2, Math.floor(k / 2) % 2, Math.floor(k / 4)]);
+const POINTS: Vec3[] = Array.from({ length: 12 }, (_, k) => [
+  k % 2,
+  Math.floor(k / 2) % 2,
+  Math.floor(k / 4),
+]);
 
 function lattice(): Posed {
   const corners = outermostPoints(SHAPE).map((k) => POINTS[k]) as Corners;
@@ -78,10 +82,13 @@ describe("a lattice", () => {
 describe("proportional editing", () => {
   it("has the curves of the server", () => {
     const at = (curve: Curve): number => curveWeight(0.25, { radius: 1, curve });
-    expectClose(
-      (["smooth", "sphere", "root", "sharp", "linear"] as const).map(at),
-      [0.84375, Math.sqrt(0.9375), Math.sqrt(0.75), 0.5625, 0.75],
-    );
+    expectClose((["smooth", "sphere", "root", "sharp", "linear"] as const).map(at), [
+      0.84375,
+      Math.sqrt(0.9375),
+      Math.sqrt(0.75),
+      0.5625,
+      0.75,
+    ]);
     expect(curveWeight(1, { radius: 1, curve: "root" })).toBe(0);
   });
 

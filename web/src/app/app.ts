@@ -219,13 +219,7 @@ export class App {
     const edit = selectedEdit(now);
     const eye = this.viewport.camera.position.toArray();
     const grid = now.grid && edit !== null ? this.grid.linesFor(edit, shownCages(edit, this.drag)) : [];
-    const { segments, dots } = cageOverlay(
-      now,
-      this.drag,
-      grid,
-      eye,
-      this.viewport.forward.toArray(),
-    );
+    const { segments, dots } = cageOverlay(now, this.drag, grid, eye, this.viewport.forward.toArray());
     this.lines.set(segments);
     this.handles.set(dots);
     const { selection } = now.state ?? { selection: null };

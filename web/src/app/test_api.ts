@@ -119,7 +119,9 @@ export function testApi(app: App): TestApi {
       const edit = app.store.now.state?.edits.find((each) => each.id === id);
       const posed = edit && app.shownCages(edit)[cage];
       if (!posed) throw new Error(`edit ${id} has no ${cage} cage`);
-      const { x, y } = viewport.project(middleOf(kind === "point" ? posed : { ...posed, points: undefined }, partCorners({ kind, index })));
+      const { x, y } = viewport.project(
+        middleOf(kind === "point" ? posed : { ...posed, points: undefined }, partCorners({ kind, index })),
+      );
       return inWindow(x, y);
     },
     grip(axis) {

@@ -41,10 +41,7 @@ export function shownCages(edit: EditState, drag: Drag | null): Cages {
 }
 
 /** The cages whose parts can be dragged, in order of precedence. */
-export function draggableCages(
-  editor: Editor,
-  cages: Cages,
-): { cage: "inner" | "outer"; posed: Posed }[] {
+export function draggableCages(editor: Editor, cages: Cages): { cage: "inner" | "outer"; posed: Posed }[] {
   if (editor.mode === "edit") return [{ cage: "inner", posed: cages.deformed }];
   const inner = { cage: "inner" as const, posed: cages.inner };
   if (cages.outer === null) return [inner];

@@ -45,16 +45,14 @@ export function moveCornersBy(corners: readonly number[], by: Vector3): Operatio
 }
 
 /** A motion of handles as one of control points, where the cage has them; any other operation as it is. */
-export function asPointMove(
-  operation: Operation,
-  cage: Posed,
-  proportional: Proportional | null,
-): Operation {
+export function asPointMove(operation: Operation, cage: Posed, proportional: Proportional | null): Operation {
   if (operation.kind !== "move_corners" || cage.points === undefined) return operation;
   const { corners: points, by } = operation;
   if (proportional !== null)
     return { kind: "move_points", points, by, radius: proportional.radius, falloff: proportional.curve };
-  return points.length === 1 ? { kind: "move_point", point: points[0], by } : { kind: "move_points", points, by };
+  return points.length === 1
+    ? { kind: "move_point", point: points[0], by }
+    : { kind: "move_points", points, by };
 }
 
 /** Intersection of a ray with the plane through a point; null for a parallel ray, or a plane behind it. */

@@ -198,7 +198,9 @@ function diagonal([x, y, z]: Vec3): Matrix3 {
 
 function mapped(cage: Posed, map: (point: Vec3) => Vec3): Posed {
   const corners = cage.corners.map(map) as Corners;
-  return cage.points === undefined ? { ...cage, corners } : { ...cage, corners, points: cage.points.map(map) };
+  return cage.points === undefined
+    ? { ...cage, corners }
+    : { ...cage, corners, points: cage.points.map(map) };
 }
 
 function transformAboutPivot(point: Vec3, pivot: Vec3, matrix: Matrix3): Vec3 {

@@ -112,7 +112,8 @@ export class Pointer {
   private get proportional(): Proportional | null {
     const { proportional, proportionalRadius, curve } = this.app.store.now;
     const { drag } = this.app;
-    if (!proportional || drag === null || targetCage(drag.start, drag.target).points === undefined) return null;
+    if (!proportional || drag === null || targetCage(drag.start, drag.target).points === undefined)
+      return null;
     return { radius: proportionalRadius ?? halfExtent(drag.start.deformed.corners), curve };
   }
 

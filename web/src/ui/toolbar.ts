@@ -143,10 +143,13 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
       ),
     ),
   );
-  app.store.watch(["hello", "tool", "selecting", "mode", "cage", "axes", "snap", "proportional", "cages"], (now) => {
-    for (const element of editing) element.hidden = isReadOnly(now);
-    for (const [button, on] of lit) button.classList.toggle("on", on(now));
-    for (const element of setOnly) element.classList.toggle("away", now.mode !== "set" || isReadOnly(now));
-  });
+  app.store.watch(
+    ["hello", "tool", "selecting", "mode", "cage", "axes", "snap", "proportional", "cages"],
+    (now) => {
+      for (const element of editing) element.hidden = isReadOnly(now);
+      for (const [button, on] of lit) button.classList.toggle("on", on(now));
+      for (const element of setOnly) element.classList.toggle("away", now.mode !== "set" || isReadOnly(now));
+    },
+  );
   return bar;
 }
