@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from cagefield.edits import MovePoint, MovePoints, load_edits
 from cagefield.geometry.cage import LatticeCage
@@ -58,10 +59,10 @@ def editor(server: EditorServer) -> Iterator[EditorPage]:
         yield page
 
 
-def moves(page: EditorPage) -> np.ndarray:
+def moves(page: EditorPage) -> NDArray[np.float64]:
     """By how much each control point [n,3] of the selected edit has moved."""
     points = page.edit["points"]
-    return np.subtract(points["deformed"], points["canonical"])
+    return np.subtract(points["deformed"], points["canonical"], dtype=np.float64)
 
 
 def test_a_lattice_point_is_dragged_undone_and_saved(editor: EditorPage, scene: Path) -> None:

@@ -103,9 +103,3 @@ export function halfExtent(corners: Corners): number {
   );
   return (spans[0] + spans[1] + spans[2]) / 6;
 }
-
-/** Whether two cages have the same corners, to a millionth of their size. */
-export function haveSameCorners(a: Corners, b: Corners): boolean {
-  const slack = 1e-6 * halfExtent(a);
-  return a.every((corner, k) => corner.every((x, i) => Math.abs(x - b[k][i]) <= slack));
-}

@@ -219,7 +219,7 @@ export function listenForKeys(app: App, actions: Actions, pointer: Pointer, all:
     if ((name === "X" || name === "Y" || name === "Z") && pointer.constrain(name)) return;
     if (name === "PageUp" && pointer.resizeReach(1)) return event.preventDefault();
     if (name === "PageDown" && pointer.resizeReach(-1)) return event.preventDefault();
-    if (name === "O" && pointer.dragging) {
+    if (name === "O" && pointer.dragging && !event.repeat) {
       app.store.set({ proportional: !app.store.now.proportional });
       return pointer.applyMotion();
     }

@@ -180,13 +180,15 @@ export function options(app: App, actions: Actions): HTMLElement {
     }
     const [shell, falloff, width, lattice, error] = continuous;
     for (const binding of continuous) binding.hidden = edit.kind !== "continuous";
-    falloff.hidden = width.hidden = edit.kind !== "continuous" || edit.shell !== "flow";
+    falloff.hidden = width.hidden =
+      edit.kind !== "continuous" || edit.shell !== "flow" || edit.cage === "points";
     error.hidden = lattice.hidden || edit.lattice === 0;
     kinds.hidden = edit.source !== null;
     from.hidden = edit.source === null;
     relight.hidden = !canRelight(now);
     fills.hidden = !canFill(now);
     for (const binding of [shell, lattice, fills, relight]) binding.disabled = edit.locked;
+    if (edit.cage !== "box") shell.disabled = true;
     filling = true;
     points.show(edit);
     pane.refresh();

@@ -72,13 +72,11 @@ export function pointOptions(app: App, actions: Actions, pane: Pane): PointOptio
     .on("click", () => apply({ kind: "taper", ...axisAndEnd(), factor: model.factor }));
 
   const reach = pane.addFolder({ title: "Control points" });
-  reach
-    .addBinding(model, "radius", { label: "Radius", min: 1e-6, step: 0.001 })
-    .on("change", ({ value, last }) => {
-      const before = shown?.points?.radius ?? null;
-      if (last && shown !== null && before !== null && value !== before)
-        app.send({ type: "point_reach", edit: shown.id, radius: value });
-    });
+  reach.addBinding(model, "radius", { label: "Radius", min: 1e-6 }).on("change", ({ value, last }) => {
+    const before = shown?.points?.radius ?? null;
+    if (last && shown !== null && before !== null && Math.abs(value - before) > 1e-9)
+      app.send({ type: "point_reach", edit: shown.id, radius: value });
+  });
   reach.addBinding(model, "falloff", { label: "Falloff", options: CURVES }).on("change", ({ value }) => {
     if (shown?.points?.falloff && value !== shown.points.falloff)
       app.send({ type: "point_reach", edit: shown.id, falloff: value as Curve });
