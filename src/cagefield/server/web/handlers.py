@@ -242,17 +242,13 @@ class MessageHandlers:
 
     @_handles(client_messages.Place)
     async def _place(self, message: client_messages.Place) -> None:
-        anywhere = message.x is None or message.y is None
-        x, y = (0.5, 0.5) if message.x is None or message.y is None else (message.x, message.y)
-        point, height = await self._seen(x, y, anywhere=anywhere)
+        point, height = await self._pointed_at(message)
         self._session.place(point, height)
         self._coordinator.changed()
 
     @_handles(point_messages.PlacePoint)
     async def _place_point(self, message: point_messages.PlacePoint) -> None:
-        anywhere = message.x is None or message.y is None
-        x, y = (0.5, 0.5) if message.x is None or message.y is None else (message.x, message.y)
-        point, height = await self._seen(x, y, anywhere=anywhere)
+        point, height = await self._pointed_at(message)
         self._session.place_point(point, height)
         self._coordinator.changed()
 
@@ -265,6 +261,14 @@ class MessageHandlers:
     def _point_reach(self, message: point_messages.PointReach) -> None:
         self._session.point_reach(message.edit, message.radius, message.falloff)
         self._coordinator.changed()
+
+    async def _pointed_at(
+        self, message: client_messages.Place | point_messages.PlacePoint
+    ) -> tuple[Array, float]:
+        """Point [3] and view height, as `_seen`, at the pixel of a message; the middle without one."""
+        if message.x is None or message.y is None:
+            return await self._seen(0.5, 0.5, anywhere=True)
+        return await self._seen(message.x, message.y, anywhere=False)
 
     async def _seen(self, x: float, y: float, *, anywhere: bool) -> tuple[Array, float]:
         """The point [3] of the surface seen at a pixel, and the height of the view frustum there, world
