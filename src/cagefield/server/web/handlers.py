@@ -242,13 +242,13 @@ class MessageHandlers:
 
     @_handles(client_messages.Place)
     async def _place(self, message: client_messages.Place) -> None:
-        point, height = await self._pointed_at(message)
+        point, height = await self._seen(message.x, message.y)
         self._session.place(point, height)
         self._coordinator.changed()
 
     @_handles(point_messages.PlacePoint)
     async def _place_point(self, message: point_messages.PlacePoint) -> None:
-        point, height = await self._pointed_at(message)
+        point, height = await self._seen(message.x, message.y)
         self._session.place_point(point, height)
         self._coordinator.changed()
 
@@ -262,24 +262,16 @@ class MessageHandlers:
         self._session.point_reach(message.edit, message.radius, message.falloff)
         self._coordinator.changed()
 
-    async def _pointed_at(
-        self, message: client_messages.Place | point_messages.PlacePoint
-    ) -> tuple[Array, float]:
-        """Point [3] and view height, as `_seen`, at the pixel of a message; the middle without one."""
-        if message.x is None or message.y is None:
-            return await self._seen(0.5, 0.5, anywhere=True)
-        return await self._seen(message.x, message.y, anywhere=False)
+    async def _seen(self, x: float | None, y: float | None) -> tuple[Array, float]:
+        """The point [3] of the surface at a pixel, and the view frustum's height there, world units.
 
-    async def _seen(self, x: float, y: float, *, anywhere: bool) -> tuple[Array, float]:
-        """The point [3] of the surface seen at a pixel, and the height of the view frustum there, world
-        units.
-
-        Where none is seen, `anywhere` takes the middle of the field.
+        Without a pixel it is in the middle of the view, or of the field where no surface is seen there.
         """
         camera = self._page.camera
         if camera is None:
             raise CagefieldError("the page has sent no camera yet; try again")
-        found = await self._surface(x, y)
+        anywhere = x is None or y is None
+        found = await self._surface(0.5 if x is None else x, 0.5 if y is None else y)
         if found is None and not anywhere:
             raise CagefieldError("there is no surface under the mouse; double-click on the object")
         point = np.array(found[0]) if found is not None else self._session.bounds.mean(axis=0)
@@ -289,7 +281,7 @@ class MessageHandlers:
     async def _paste_scene(self, message: client_messages.PasteScene) -> None:
         path = self._coordinator.store.source_of(message.source)
         box, up, own_up = await self._coordinator.ask(lambda number: LookTask(number, str(path)))
-        point, height = await self._seen(0.5, 0.5, anywhere=True)
+        point, height = await self._seen(None, None)
         edit = build_paste(
             str(path), path.stem[:100], np.array(box), np.array(up), point, np.array(own_up), height
         )
