@@ -168,7 +168,7 @@ def editor(page: Page) -> None:
     """Waits until the page has drawn the view that is turned."""
     until(page, "Boolean(window.cagefield && cagefield.now.state) && cagefield.page.draws")
     page.keyboard.press("n")
-    page.keyboard.press("o")
+    page.keyboard.press("Shift+O")
     until(page, "cagefield.settled")
     page.mouse.move(120, 330)
     page.mouse.down()

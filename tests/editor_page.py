@@ -196,14 +196,14 @@ class EditorPage:
         self.page.bring_to_front()
         self.page.evaluate("document.querySelector('.toasts').style.visibility = 'hidden'")
         if not cages:
-            self.press("o")
+            self.press("Shift+O")
             self.until("!cagefield.now.cages")
         self.page.mouse.move(2, 2)
         self.page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
         image = Image.open(io.BytesIO(self.page.screenshot(clip=self.box)))
         self.page.evaluate("document.querySelector('.toasts').style.visibility = ''")
         if not cages:
-            self.press("o")
+            self.press("Shift+O")
         return np.asarray(image.convert("RGB"), dtype=np.float64) / 255.0
 
     @property

@@ -1,7 +1,8 @@
+import type { Posed } from "../src/editing/cage";
 import { describe, expect, it } from "vitest";
 import cases from "../../tests/fixtures/cage_operations.json";
 import { apply, scaleOperation } from "../src/editing/operations";
-import type { Operation, Posed } from "../src/editing/operations";
+import type { Operation } from "../src/editing/operations";
 import { expectClose } from "./cages";
 
 /** A case of the fixture that `tests/cage_operations.py` writes. */

@@ -22,6 +22,9 @@ export function edit(change: Partial<EditState> = {}): EditState {
     inner,
     deformed: inner,
     outer: box([0, 0, 0], [1.6, 1.6, 1.6]),
+    cage: "box",
+    points: null,
+    outer_follows: false,
     pivot: [0, 0, 0],
     inner_pivot: [0, 0, 0],
     outer_pivot: [0, 0, 0],
@@ -67,6 +70,7 @@ export class FakeServer {
   answer(part: number, deformed: Corners, why: string | null): Dragged {
     const drag = this.got.filter((message) => message.type === "drag").at(-1)!;
     const { inner, outer } = edit();
-    return { type: "dragged", drag: drag.drag, seq: drag.seq, part, why, inner, deformed, outer };
+    const points = { points: [], deformed_points: [] };
+    return { type: "dragged", drag: drag.drag, seq: drag.seq, part, why, inner, deformed, outer, ...points };
   }
 }

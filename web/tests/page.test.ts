@@ -155,8 +155,9 @@ describe("the store", () => {
 
 describe("what is drawn", () => {
   const eye: [number, number, number] = [0, -5, 0];
+  const forward: [number, number, number] = [0, 1, 0];
   it("is both cages of the selected edit, with a dot on each corner and on faces that look this way", () => {
-    const { segments, dots } = cageOverlay({ ...INITIAL, state: state() }, null, [], eye);
+    const { segments, dots } = cageOverlay({ ...INITIAL, state: state() }, null, [], eye, forward);
     expect(segments).toHaveLength(24);
     expect(dots.filter((dot) => dot.shape === "round")).toHaveLength(8);
     expect(dots.filter((dot) => dot.shape === "square")).toHaveLength(1);
@@ -165,28 +166,31 @@ describe("what is drawn", () => {
   it("is where the inner cage was, too, once it has moved; and both cages' handles in Set mode", () => {
     const moved = edit({ deformed: edit().inner.map(([x, y, z]) => [x + 0.1, y, z]) as never });
     expect(
-      cageOverlay({ ...INITIAL, state: state({ edits: [moved] }) }, null, [], eye).segments,
+      cageOverlay({ ...INITIAL, state: state({ edits: [moved] }) }, null, [], eye, forward).segments,
     ).toHaveLength(36);
-    expect(cageOverlay({ ...INITIAL, state: state(), mode: "set" }, null, [], eye).dots).toHaveLength(18);
+    expect(
+      cageOverlay({ ...INITIAL, state: state(), mode: "set" }, null, [], eye, forward).dots,
+    ).toHaveLength(18);
   });
 
   it("has the other edits in their colors, hidden ones not, and nothing where cages are off or a page plays", () => {
     const edits = [edit(), edit({ id: 2, colour: "#ff0000" }), edit({ id: 3, enabled: false })];
-    const { segments } = cageOverlay({ ...INITIAL, state: state({ edits }) }, null, [], eye);
+    const { segments } = cageOverlay({ ...INITIAL, state: state({ edits }) }, null, [], eye, forward);
     expect(segments).toHaveLength(48);
     expect(segments.filter(({ srgbColor: color }) => color.r > 0.99 && color.g < 0.01)).toHaveLength(24);
     expect(
-      cageOverlay({ ...INITIAL, state: state({ edits }), cages: false }, null, [], eye).segments,
+      cageOverlay({ ...INITIAL, state: state({ edits }), cages: false }, null, [], eye, forward).segments,
     ).toHaveLength(0);
     const preview: Preview = { type: "preview", page: 1, play: 1, on: true };
     expect(
-      cageOverlay({ ...INITIAL, state: state({ edits }), preview }, null, [], eye).segments,
+      cageOverlay({ ...INITIAL, state: state({ edits }), preview }, null, [], eye, forward).segments,
     ).toHaveLength(0);
   });
 
   it("has no handles where the edit is locked", () => {
     expect(
-      cageOverlay({ ...INITIAL, state: state({ edits: [edit({ locked: true })] }) }, null, [], eye).dots,
+      cageOverlay({ ...INITIAL, state: state({ edits: [edit({ locked: true })] }) }, null, [], eye, forward)
+        .dots,
     ).toHaveLength(0);
   });
 });

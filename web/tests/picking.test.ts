@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { EDGES, FACE_NAMES } from "../src/editing/cage";
 import {
-  distanceToEdges,
+  distanceToCage,
   visibleFaceCenters,
   pickPart,
   pickCorner,
@@ -36,6 +36,6 @@ describe("picking", () => {
   });
 
   it("measures how far the edges are", () => {
-    expect(distanceToEdges(620, 500, cage.corners, project)).toBeCloseTo(20, 9);
+    expect(distanceToCage(620, 500, { corners: cage.corners, pivot: [0, 0, 0] }, project)).toBeCloseTo(20, 9);
   });
 });

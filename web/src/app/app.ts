@@ -1,6 +1,5 @@
 /** The editor: its parts, connected to each other, to the server's messages and to the canvas. */
 import { Vector3 } from "three";
-import { centroid } from "../editing/cage";
 import { cageOverlay, shownCages } from "../editing/cage_overlay";
 import { Drag, targetCage } from "../editing/drag";
 import { Gizmo } from "../editing/gizmo";
@@ -8,6 +7,7 @@ import { Grid } from "../editing/grid";
 import { Highlight } from "../editing/highlight";
 import { Handles } from "../editing/handles";
 import { Lines } from "../editing/lines";
+import { middleOf } from "../editing/point_cages";
 import type { Operation } from "../editing/operations";
 import { memoryLimit } from "../field/render_location";
 import { CameraFeed } from "../frames/camera_feed";
@@ -197,7 +197,7 @@ export class App {
     this.viewport.invalidate();
   }
 
-  /** Switches to Set mode as soon as the requested new edit arrives. */
+  /** Switches to Set mode, of control points to Edit mode, as soon as the requested new edit arrives. */
   expectEdit(): void {
     this.lastEditId = Math.max(0, ...(this.store.now.state?.edits.map((edit) => edit.id) ?? []));
   }
@@ -210,9 +210,7 @@ export class App {
     const { now } = this.store;
     const edit = selectedEdit(now);
     if (edit === null || now.corners.length === 0) return null;
-    return new Vector3(
-      ...centroid(targetCage(shownCages(edit, this.drag), dragTarget(now)).corners, now.corners),
-    );
+    return new Vector3(...middleOf(targetCage(shownCages(edit, this.drag), dragTarget(now)), now.corners));
   }
 
   /** Updates lines, handles and the gizmo. */
@@ -221,7 +219,7 @@ export class App {
     const edit = selectedEdit(now);
     const eye = this.viewport.camera.position.toArray();
     const grid = now.grid && edit !== null ? this.grid.linesFor(edit, shownCages(edit, this.drag)) : [];
-    const { segments, dots } = cageOverlay(now, this.drag, grid, eye);
+    const { segments, dots } = cageOverlay(now, this.drag, grid, eye, this.viewport.forward.toArray());
     this.lines.set(segments);
     this.handles.set(dots);
     const { selection } = now.state ?? { selection: null };
@@ -297,10 +295,14 @@ export class App {
       this.store.set({ limit: null });
     }
     const isOther = state.selected !== this.store.now.state?.selected;
-    this.store.set({ state, ...(isOther ? { corners: [], hover: null } : {}) });
+    const before = selectedEdit(this.store.now);
+    const now = state.edits.find((edit) => edit.id === state.selected);
+    const hasOtherHandles = before?.points?.deformed.length !== now?.points?.deformed.length;
+    this.store.set({ state, ...(isOther || hasOtherHandles ? { corners: [], hover: null } : {}) });
     if (isExpected) {
       this.lastEditId = null;
-      this.store.set({ mode: "set", cage: "inner" });
+      const isOfPoints = selectedEdit(this.store.now)?.cage === "points";
+      this.store.set({ mode: isOfPoints ? "edit" : "set", cage: "inner" });
     }
   }
 

@@ -23,6 +23,13 @@ export function storeSession(editor: Editor, camera: number[]): void {
   sessionStorage.setItem(CAMERA, JSON.stringify(camera));
 }
 
+/** Whether something is used for the first time in this browser; false from then on. */
+export function isFirstUse(name: string): boolean {
+  if (localStorage.getItem(name) !== null) return false;
+  localStorage.setItem(name, "used");
+  return true;
+}
+
 function read(key: string): unknown {
   const text = sessionStorage.getItem(key);
   if (text === null) return null;

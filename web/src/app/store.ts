@@ -1,5 +1,6 @@
 /** State of the editor's page, with listeners that are called at each change. */
 import type { CagePart } from "../editing/cage";
+import type { Curve } from "../editing/point_cages";
 import type { Axes } from "../editing/operations";
 import type {
   Drawing,
@@ -62,8 +63,13 @@ export interface Editor {
   cages: boolean;
   panel: boolean;
   help: boolean;
-  /** Corners that are dragged together, by the gizmo or by one of the corners. */
+  /** Corners, or control points, that are dragged together, by the gizmo or by one of them. */
   corners: number[];
+  /** Whether control points around the dragged ones go along in part. */
+  proportional: boolean;
+  /** Radius of that, world units; null before the first drag, which takes it from the cage. */
+  proportionalRadius: number | null;
+  curve: Curve;
   hover: Hover | null;
   /** The tool that selects elements; null for the tools of cages. */
   selecting: SelectTool | null;
@@ -109,6 +115,9 @@ export const INITIAL: Editor = {
   panel: true,
   help: false,
   corners: [],
+  proportional: false,
+  proportionalRadius: null,
+  curve: "smooth",
   hover: null,
   selecting: null,
   selectMode: "replace",

@@ -1,10 +1,11 @@
 /** `window.cagefield`: state of the page for tests and measurements. */
-import { partCorners, centroid, type CagePart } from "../editing/cage";
+import { partCorners, type CagePart } from "../editing/cage";
 import type { App } from "./app";
 import type { Latency } from "../frames/latency";
 import type { Operation } from "../editing/operations";
 import type { PictureHeader } from "../net/protocol";
-import { pickCorner } from "../editing/picking";
+import { pickHandle } from "../editing/picking";
+import { middleOf } from "../editing/point_cages";
 import { draggableCages } from "../editing/cage_overlay";
 import { selectedEdit, type DrawnHere, type Editor } from "./store";
 
@@ -118,7 +119,9 @@ export function testApi(app: App): TestApi {
       const edit = app.store.now.state?.edits.find((each) => each.id === id);
       const posed = edit && app.shownCages(edit)[cage];
       if (!posed) throw new Error(`edit ${id} has no ${cage} cage`);
-      const { x, y } = viewport.project(centroid(posed.corners, partCorners({ kind, index })));
+      const { x, y } = viewport.project(
+        middleOf(kind === "point" ? posed : { ...posed, points: undefined }, partCorners({ kind, index })),
+      );
       return inWindow(x, y);
     },
     grip(axis) {
@@ -132,7 +135,7 @@ export function testApi(app: App): TestApi {
       const cages = edit === null ? [] : draggableCages(app.store.now, app.shownCages(edit));
       const slack = { x: 4 / width, y: 4 / height };
       const at = app.gizmo.grip(axis, slack, (device) =>
-        cages.every(({ corners }) => pickCorner(...pixel(device), corners, viewport.project) === null),
+        cages.every(({ posed }) => pickHandle(...pixel(device), posed, viewport.project) === null),
       );
       return at && inWindow(...pixel(at));
     },

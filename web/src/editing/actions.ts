@@ -1,9 +1,11 @@
 /** Actions of the user apart from drags, for keys, buttons and menus. */
-import { halfExtent, centroid } from "./cage";
+import { halfExtent } from "./cage";
 import { targetCage } from "./drag";
+import { middleOf } from "./point_cages";
 import type { App } from "../app/app";
-import type { ChangeSelection, Command, EditState, Mirror, Place, Vec3 } from "../net/protocol";
+import type { ChangeSelection, Command, EditState, Mirror, Place, Subdivide, Vec3 } from "../net/protocol";
 import { isSplatFile, uploadAddress, uploadFile } from "../net/upload";
+import { isFirstUse } from "../app/session_storage";
 import {
   canFill,
   canRelight,
@@ -17,6 +19,7 @@ import {
 } from "../app/store";
 
 const VIEWS: View[] = ["colour", "depth", "opacity", "normals"];
+const O_KEY_NOTICE = "cagefield.proportional";
 const CAGES: CageName[] = ["inner", "outer", "both"];
 
 /** Limits of the brush's radius, shares of the view's height, and the factor of a step. */
@@ -95,6 +98,26 @@ export class Actions {
 
   nextView(): void {
     this.setView(next(VIEWS, this.app.store.now.view));
+  }
+
+  /** Switches proportional editing; says once for each browser that this key showed the cages before. */
+  toggleProportional(moved: boolean): void {
+    const proportional = !this.app.store.now.proportional;
+    this.app.store.set({ proportional });
+    if (moved && isFirstUse(O_KEY_NOTICE))
+      this.app.say("O is proportional editing of points now; Shift+O shows or hides the cages");
+    else this.app.say(`proportional editing is ${proportional ? "on: the wheel changes its radius" : "off"}`);
+  }
+
+  /** Makes an edit of a control point, on the surface in the middle of the view. */
+  placePoint(): void {
+    this.app.expectEdit();
+    this.app.send({ type: "place_point" });
+  }
+
+  /** Makes the selected inner cage a lattice. */
+  subdivide(cells: Subdivide["cells"], interpolation: Subdivide["interpolation"]): void {
+    this.withSelected((edit) => this.app.send({ type: "subdivide", edit: edit.id, cells, interpolation }));
   }
 
   toggle(what: "snap" | "grid" | "cages" | "panel" | "help"): void {
@@ -187,8 +210,8 @@ export class Actions {
   focus(x: number, y: number): void {
     const edit = selectedEdit(this.app.store.now);
     if (edit !== null) {
-      const { corners } = targetCage(this.app.shownCages(edit), dragTarget(this.app.store.now));
-      this.app.viewport.focus(centroid(corners), 2 * halfExtent(corners));
+      const cage = targetCage(this.app.shownCages(edit), dragTarget(this.app.store.now));
+      this.app.viewport.focus(middleOf(cage), 2 * halfExtent(cage.corners));
       return;
     }
     const { width, height } = this.app.viewport.points;

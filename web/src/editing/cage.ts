@@ -24,21 +24,33 @@ export const FACES: readonly (readonly number[])[] = FACE_NAMES.map((name) => {
   return ALL_CORNERS.filter((k) => ((k >> axis) & 1) === bit);
 });
 
-/** A part of a cage that can be dragged: a corner, an edge or a face. */
+/** A part of a cage that can be dragged: a corner, an edge, a face, or a control point. */
 export interface CagePart {
-  kind: "corner" | "edge" | "face";
-  /** Corner number, or index in `EDGES` or `FACES`. */
+  kind: "corner" | "edge" | "face" | "point";
+  /** Number of the corner or the control point, or index in `EDGES` or `FACES`. */
   index: number;
 }
 
-/** Numbers of the corners of a part. */
+/** A cage as it is drawn and moved. */
+export interface Posed {
+  corners: Corners;
+  pivot: Vec3;
+  /** Control points of a lattice, x fastest, or points on their own; none of a box. */
+  points?: readonly Vec3[];
+  /** Points of a lattice along x, y and z; null for points on their own. */
+  shape?: [number, number, number] | null;
+  /** Reach of points on their own. */
+  radius?: number | null;
+}
+
+/** Numbers of the corners of a part; of a control point, its own. */
 export function partCorners(part: CagePart): number[] {
-  if (part.kind === "corner") return [part.index];
+  if (part.kind === "corner" || part.kind === "point") return [part.index];
   return [...(part.kind === "edge" ? EDGES : FACES)[part.index]];
 }
 
-/** Mean of the given corners [3]; of all 8 by default. */
-export function centroid(corners: Corners, which: readonly number[] = ALL_CORNERS): Vec3 {
+/** Mean of the given corners [3], or of other points; of all by default. */
+export function centroid(corners: readonly Vec3[], which: readonly number[] = [...corners.keys()]): Vec3 {
   const sum = new Vector3();
   for (const k of which) sum.add(new Vector3(...corners[k]));
   return sum.divideScalar(which.length).toArray();
@@ -90,10 +102,4 @@ export function halfExtent(corners: Corners): number {
     ),
   );
   return (spans[0] + spans[1] + spans[2]) / 6;
-}
-
-/** Whether two cages have the same corners, to a millionth of their size. */
-export function haveSameCorners(a: Corners, b: Corners): boolean {
-  const slack = 1e-6 * halfExtent(a);
-  return a.every((corner, k) => corner.every((x, i) => Math.abs(x - b[k][i]) <= slack));
 }

@@ -1,10 +1,11 @@
 /** Lines and handles of all cages for the state of the editor. */
 import type { Color } from "three";
-import { EDGES, partCorners, haveSameCorners, type CagePart } from "./cage";
-import { cagesOf, type Cages, type Drag } from "./drag";
+import { EDGES, partCorners, type CagePart, type Posed } from "./cage";
+import { areSimilarCages, cagesOf, targetCage, type Cages, type Drag } from "./drag";
 import type { Dot } from "./handles";
 import { color, type Segment } from "./lines";
 import { visibleFaceCenters } from "./picking";
+import { cageLines, circle, handlesOf, middleOf } from "./point_cages";
 import type { Corners, EditState, Vec3 } from "../net/protocol";
 import { dragObstacle, selectedEdit, showsCages, type Editor } from "../app/store";
 
@@ -20,6 +21,8 @@ interface Stroke {
 }
 
 const INNER: Stroke = { width: 2.4, alpha: 1, hiddenAlpha: 0.6 };
+const NET: Stroke = { width: 1.4, alpha: 0.85, hiddenAlpha: 0.3 };
+const REACH: Stroke = { width: 1.2, alpha: 0.9, hiddenAlpha: 0.9 };
 const OUTER: Stroke = { width: 1.5, alpha: 0.75, hiddenAlpha: 0.35 };
 const OUTER_SET: Stroke = { width: 2, alpha: 0.95, hiddenAlpha: 0.45 };
 const IDLE: Stroke = { width: 1, alpha: 0.25, hiddenAlpha: 0.12 };
@@ -38,19 +41,22 @@ export function shownCages(edit: EditState, drag: Drag | null): Cages {
 }
 
 /** The cages whose parts can be dragged, in order of precedence. */
-export function draggableCages(
-  editor: Editor,
-  cages: Cages,
-): { cage: "inner" | "outer"; corners: Corners }[] {
-  if (editor.mode === "edit") return [{ cage: "inner", corners: cages.deformed.corners }];
-  const inner = { cage: "inner" as const, corners: cages.inner.corners };
+export function draggableCages(editor: Editor, cages: Cages): { cage: "inner" | "outer"; posed: Posed }[] {
+  if (editor.mode === "edit") return [{ cage: "inner", posed: cages.deformed }];
+  const inner = { cage: "inner" as const, posed: cages.inner };
   if (cages.outer === null) return [inner];
-  const outer = { cage: "outer" as const, corners: cages.outer.corners };
+  const outer = { cage: "outer" as const, posed: cages.outer };
   return editor.cage === "outer" ? [outer, inner] : [inner, outer];
 }
 
 /** Lines and dots of all visible edits. */
-export function cageOverlay(editor: Editor, drag: Drag | null, grid: Vec3[][], eye: Vec3): CageOverlay {
+export function cageOverlay(
+  editor: Editor,
+  drag: Drag | null,
+  grid: Vec3[][],
+  eye: Vec3,
+  forward: Vec3,
+): CageOverlay {
   const out: CageOverlay = { segments: [], dots: [] };
   if (!showsCages(editor) || editor.state === null) return out;
   const chosen = selectedEdit(editor);
@@ -58,10 +64,19 @@ export function cageOverlay(editor: Editor, drag: Drag | null, grid: Vec3[][], e
     if (edit === chosen || !edit.enabled) continue;
     const cages = shownCages(edit, drag);
     const tint = color(edit.colour);
-    addCage(out, cages.deformed.corners, tint, OTHER);
-    if (cages.outer && edit.kind === "continuous") addCage(out, cages.outer.corners, tint, OTHER_OUTER);
+    addCage(out, cages.deformed, tint, OTHER);
+    if (edit.cage === "points") addPoints(out, cages.deformed, tint);
+    if (cages.outer && edit.kind === "continuous" && !edit.outer_follows)
+      addCage(out, cages.outer, tint, OTHER_OUTER);
   }
-  if (chosen !== null) addSelectedEdit(out, editor, chosen, shownCages(chosen, drag), grid, eye);
+  if (chosen === null) return out;
+  const cages = shownCages(chosen, drag);
+  addSelectedEdit(out, editor, chosen, cages, grid, eye);
+  if (chosen.cage === "points") addReach(out, editor, cages, color(chosen.colour), forward);
+  if (drag?.operation?.kind === "move_points" && (drag.operation.radius ?? 0) > 0) {
+    const center = middleOf(targetCage(cages, drag.target), drag.operation.points);
+    addPolyline(out, circle(center, drag.operation.radius!, forward), WHITE, REACH);
+  }
   return out;
 }
 
@@ -78,23 +93,39 @@ function addSelectedEdit(
   const dim = edit.enabled ? 1 : 0.4;
   if (editor.grid) for (const line of grid) addPolyline(out, line, tint, GRID);
   const [first, second] = setting ? [cages.inner, cages.deformed] : [cages.deformed, cages.inner];
-  if (!haveSameCorners(first.corners, second.corners)) addCage(out, second.corners, GHOST_COLOR, GHOST, dim);
-  if (cages.outer) {
+  if (!areSimilarCages(first, second)) addCage(out, second, GHOST_COLOR, GHOST, dim);
+  if (cages.outer && !edit.outer_follows) {
     const stroke = edit.kind !== "continuous" ? IDLE : setting && editor.cage !== "inner" ? OUTER_SET : OUTER;
-    addCage(out, cages.outer.corners, tint.clone().lerp(WHITE, 0.35), stroke, dim);
+    addCage(out, cages.outer, tint.clone().lerp(WHITE, 0.35), stroke, dim);
   }
-  addCage(out, first.corners, tint, INNER, dim);
-  if (dragObstacle(editor, edit) !== null) return;
-  for (const { cage: name, corners } of draggableCages(editor, cages)) {
+  addCage(out, first, tint, edit.cage === "lattice" ? NET : INNER, dim);
+  if (dragObstacle(editor, edit) !== null) {
+    if (edit.cage === "points") addPoints(out, first, tint);
+    return;
+  }
+  for (const { cage: name, posed } of draggableCages(editor, cages)) {
     const hover = editor.hover?.cage === name ? editor.hover.part : null;
-    if (hover) addHighlight(out, corners, hover);
+    if (hover && posed.points === undefined) addHighlight(out, posed.corners, hover);
     const main = name === "outer" ? editor.cage === "outer" : !setting || editor.cage !== "outer";
-    addDots(out, corners, tint, hover, main ? editor.corners : [], main, eye);
+    addDots(out, posed, tint, hover, main ? editor.corners : [], main, eye);
   }
 }
 
-function addCage(out: CageOverlay, corners: Corners, tint: Color, stroke: Stroke, dim = 1): void {
-  for (const [i, j] of EDGES) addSegment(out, corners[i], corners[j], tint, stroke, dim);
+function addCage(out: CageOverlay, cage: Posed, tint: Color, stroke: Stroke, dim = 1): void {
+  for (const [from, to] of cageLines(cage)) addSegment(out, from, to, tint, stroke, dim);
+}
+
+/** Control points on their own of an edit that cannot be dragged now. */
+function addPoints(out: CageOverlay, cage: Posed, tint: Color): void {
+  for (const position of handlesOf(cage))
+    out.dots.push({ position, color: tint, size: 6, shape: "round", filled: true });
+}
+
+/** Circles with the radius of control points. */
+function addReach(out: CageOverlay, editor: Editor, cages: Cages, tint: Color, forward: Vec3): void {
+  const cage = editor.mode === "set" ? cages.inner : cages.deformed;
+  for (const point of handlesOf(cage))
+    addPolyline(out, circle(point, cage.radius ?? 0, forward), tint, OUTER);
 }
 
 function addPolyline(out: CageOverlay, points: Vec3[], tint: Color, stroke: Stroke): void {
@@ -122,7 +153,7 @@ function addHighlight(out: CageOverlay, corners: Corners, part: CagePart): void 
 
 function addDots(
   out: CageOverlay,
-  corners: Corners,
+  cage: Posed,
   tint: Color,
   hover: CagePart | null,
   chosen: number[],
@@ -130,7 +161,8 @@ function addDots(
   eye: Vec3,
 ): void {
   const size = main ? 9 : 7;
-  visibleFaceCenters(corners, eye).forEach((center, index) => {
+  const faces = cage.points === undefined ? visibleFaceCenters(cage.corners, eye) : [];
+  faces.forEach((center, index) => {
     if (center === null) return;
     const over = hover?.kind === "face" && hover.index === index;
     out.dots.push({
@@ -141,8 +173,8 @@ function addDots(
       filled: over,
     });
   });
-  corners.forEach((corner, index) => {
-    const over = hover?.kind === "corner" && hover.index === index;
+  handlesOf(cage).forEach((corner, index) => {
+    const over = (hover?.kind === "corner" || hover?.kind === "point") && hover.index === index;
     const taken = chosen.includes(index);
     out.dots.push({
       position: corner,

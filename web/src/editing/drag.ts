@@ -2,9 +2,10 @@
  * A drag in the page: cages that follow the mouse at once, messages to the server, and the server's answers, which state
  * the granted share of the operation.
  */
-import { apply, scaleOperation, type Operation, type Posed } from "./operations";
+import { apply, scaleOperation, type Operation } from "./operations";
 import { containedShare, expectedShare } from "./limits";
-import { halfExtent, centroid } from "./cage";
+import { halfExtent, centroid, type Posed } from "./cage";
+import { handlesOf, posedCage } from "./point_cages";
 import type { Corners, Dragged, EditState, PageMessage } from "../net/protocol";
 import type { Target } from "../app/store";
 
@@ -24,8 +25,8 @@ export interface Cages {
 /** The cages of an edit without a drag. */
 export function cagesOf(edit: EditState): Cages {
   return {
-    inner: { corners: edit.inner, pivot: edit.inner_pivot },
-    deformed: { corners: edit.deformed, pivot: edit.pivot },
+    inner: posedCage(edit.inner, edit.inner_pivot, edit.points?.canonical ?? [], edit.points),
+    deformed: posedCage(edit.deformed, edit.pivot, edit.points?.deformed ?? [], edit.points),
     outer: edit.outer && { corners: edit.outer, pivot: edit.outer_pivot ?? centroid(edit.outer) },
   };
 }
@@ -36,15 +37,17 @@ export function targetCage(cages: Cages, target: Target): Posed {
   return target === "outer" && cages.outer ? cages.outer : cages.inner;
 }
 
-/** Whether cages are equal up to CAGE_TOLERANCE. */
+/** Whether cages have the same handles, up to CAGE_TOLERANCE of the size of the first. */
+export function areSimilarCages(a: Posed, b: Posed): boolean {
+  const slack = CAGE_TOLERANCE * halfExtent(a.corners);
+  const others = handlesOf(b);
+  return handlesOf(a).every((handle, k) => handle.every((x, i) => Math.abs(x - others[k][i]) <= slack));
+}
+
 function areSimilar(a: Cages, b: Cages): boolean {
-  const size = halfExtent(a.deformed.corners);
-  const near = (p: Posed, q: Posed): boolean =>
-    p.corners.every((corner, k) =>
-      corner.every((x, i) => Math.abs(x - q.corners[k][i]) < CAGE_TOLERANCE * size),
-    );
-  const outer = a.outer === null || b.outer === null ? a.outer === b.outer : near(a.outer, b.outer);
-  return near(a.inner, b.inner) && near(a.deformed, b.deformed) && outer;
+  const outer =
+    a.outer === null || b.outer === null ? a.outer === b.outer : areSimilarCages(a.outer, b.outer);
+  return areSimilarCages(a.inner, b.inner) && areSimilarCages(a.deformed, b.deformed) && outer;
 }
 
 export class Drag {
@@ -97,8 +100,8 @@ export class Drag {
     this.applyShare(operation, message.part);
     const pivots = this.shown;
     this.shown = {
-      inner: { corners: message.inner, pivot: pivots.inner.pivot },
-      deformed: { corners: message.deformed, pivot: pivots.deformed.pivot },
+      inner: posedCage(message.inner, pivots.inner.pivot, message.points, this.edit.points),
+      deformed: posedCage(message.deformed, pivots.deformed.pivot, message.deformed_points, this.edit.points),
       outer: message.outer && {
         corners: message.outer,
         pivot: pivots.outer?.pivot ?? centroid(message.outer),
@@ -129,7 +132,7 @@ export class Drag {
   }
 
   private get isConfined(): boolean {
-    return this.target === "field" && this.edit.kind === "continuous";
+    return this.target === "field" && this.edit.kind === "continuous" && !this.edit.outer_follows;
   }
 
   private get outerCorners(): Corners | null {
@@ -148,6 +151,7 @@ export class Drag {
       case "inner":
         return { ...this.innerAfter(operation), outer };
       case "both": {
+        if (this.edit.outer_follows) return { ...this.innerAfter(operation), outer };
         const about = operation.kind === "move_corners" ? outer?.pivot : inner.pivot;
         const moved = outer && about ? apply(operation, { corners: outer.corners, pivot: about }) : null;
         return { ...this.innerAfter(operation), outer: moved };

@@ -1,6 +1,8 @@
 /** Operations from motions of the gizmo, or of a corner, an edge or a face. */
 import { Quaternion, Ray, Vector3 } from "three";
 import { degreesFromQuaternion, roundDecimals, type Axes, type Operation } from "./operations";
+import type { Posed } from "./cage";
+import type { Proportional } from "./point_cages";
 import type { Vec3 } from "../net/protocol";
 
 const UNIT_VECTORS: Record<string, Vector3> = {
@@ -40,6 +42,17 @@ export function scalingBy(factors: Vector3, axes: Axes): Operation {
 /** The motion of some corners by a vector. */
 export function moveCornersBy(corners: readonly number[], by: Vector3): Operation {
   return { kind: "move_corners", corners: [...corners].sort((a, b) => a - b), by: roundVector(by) };
+}
+
+/** A motion of handles as one of control points, where the cage has them; any other operation as it is. */
+export function asPointMove(operation: Operation, cage: Posed, proportional: Proportional | null): Operation {
+  if (operation.kind !== "move_corners" || cage.points === undefined) return operation;
+  const { corners: points, by } = operation;
+  if (proportional !== null)
+    return { kind: "move_points", points, by, radius: proportional.radius, falloff: proportional.curve };
+  return points.length === 1
+    ? { kind: "move_point", point: points[0], by }
+    : { kind: "move_points", points, by };
 }
 
 /** Intersection of a ray with the plane through a point; null for a parallel ray, or a plane behind it. */

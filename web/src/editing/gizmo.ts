@@ -10,9 +10,9 @@ import {
   type Scene,
 } from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
-import { nearestRotation } from "./cage";
+import { nearestRotation, type Posed } from "./cage";
 import { moveCornersBy, rotationBetween, scalingBy, translationBetween } from "./gestures";
-import type { Axes, Operation, Posed } from "./operations";
+import type { Axes, Operation } from "./operations";
 import type { Tool } from "../app/store";
 
 /** Logarithm of the uniform scale factor per half height of the view. */

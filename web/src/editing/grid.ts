@@ -3,6 +3,7 @@
  * a time.
  */
 import type { Cages } from "./drag";
+import { handlesOf } from "./point_cages";
 import type { Answer, EditState, Vec3 } from "../net/protocol";
 
 /** Milliseconds between two requests, at least. */
@@ -32,7 +33,7 @@ export class Grid {
       this.lines = [];
     }
     const { inner, shell, falloff, width } = edit;
-    const key = JSON.stringify([edit.id, deformed.corners, outer.corners, inner, shell, falloff, width]);
+    const key = JSON.stringify([edit.id, handlesOf(deformed), outer.corners, inner, shell, falloff, width]);
     if (key !== this.requestKey && !this.isWaiting) {
       this.requestKey = key;
       this.isWaiting = true;

@@ -20,7 +20,7 @@ export interface Dot {
   filled: boolean;
 }
 
-const MAX_DOTS = 512;
+const MAX_DOTS = 2048;
 
 const VERTEX = `
 uniform float scale;

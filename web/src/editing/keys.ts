@@ -51,6 +51,12 @@ export function bindings(
       run: () => actions.fitInner(),
     },
     {
+      group: "Cages",
+      keys: ["O"],
+      action: "Proportional editing: control points around the dragged ones go along; also while dragging",
+      run: () => actions.toggleProportional(true),
+    },
+    {
       group: "Selection",
       keys: ["M"],
       action: "Brush: paint over elements; [ and ] change its size",
@@ -127,7 +133,12 @@ export function bindings(
     },
     { group: "View", keys: ["V"], action: "Colour, depth, opacity, normals", run: () => actions.nextView() },
     { group: "View", keys: ["L"], action: "Deformed lattice", run: () => actions.toggle("grid") },
-    { group: "View", keys: ["O"], action: "Show or hide the cages", run: () => actions.toggle("cages") },
+    {
+      group: "View",
+      keys: ["Shift+O"],
+      action: "Show or hide the cages",
+      run: () => actions.toggle("cages"),
+    },
     {
       group: "View",
       keys: ["P"],
@@ -165,13 +176,18 @@ export const MOUSE_BINDINGS: { keys: string[]; action: string }[] = [
   { keys: ["B"], action: "Before the edits, while held" },
   { keys: ["Ctrl"], action: "While dragging: snap (15°, tenths, round lengths)" },
   { keys: ["X", "Y", "Z"], action: "While dragging a corner, edge or face: along this axis" },
-  { keys: ["Shift+click"], action: "Choose corners, edges and faces to drag together" },
+  {
+    keys: ["Wheel", "PageUp", "PageDown"],
+    action: "While dragging points: radius of proportional editing",
+  },
+  { keys: ["Shift+click"], action: "Choose corners, edges, faces or control points to drag together" },
   { keys: ["Shift+drag"], action: "Beside the cages: select in a rectangle" },
   {
     keys: ["Shift", "Ctrl"],
     action: "While selecting: add, subtract; both: intersect. Alt+drag orbits",
   },
   { keys: ["Double-click"], action: "A new pair of cages around the surface there" },
+  { keys: ["Ctrl+double-click"], action: "A new control point on the surface there" },
   { keys: ["Left", "Right", "Wheel"], action: "Orbit, pan, zoom" },
 ];
 
@@ -201,6 +217,12 @@ export function listenForKeys(app: App, actions: Actions, pointer: Pointer, all:
     if (event.key === "Control") return snap(true);
     if (name === "B" && !event.repeat) return app.store.set({ before: true });
     if ((name === "X" || name === "Y" || name === "Z") && pointer.constrain(name)) return;
+    if (name === "PageUp" && pointer.resizeReach(1)) return event.preventDefault();
+    if (name === "PageDown" && pointer.resizeReach(-1)) return event.preventDefault();
+    if (name === "O" && pointer.dragging && !event.repeat) {
+      app.store.set({ proportional: !app.store.now.proportional });
+      return pointer.applyMotion();
+    }
     if (pointer.dragging && name !== "Escape") return;
     if (name === "Ctrl+C" && !getSelection()?.isCollapsed) return;
     const binding = byKey.get(name);

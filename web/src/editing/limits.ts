@@ -2,8 +2,10 @@
  * Estimated limit of a drag, ahead of the server's answer: from the outer cage, and from the share that the server
  * granted last. The server's answer is authoritative.
  */
+import type { Posed } from "./cage";
 import { Matrix3, Vector3 } from "three";
-import { operationSize, apply, scaleOperation, type Operation, type Posed } from "./operations";
+import { operationSize, apply, scaleOperation, type Operation } from "./operations";
+import { handlesOf } from "./point_cages";
 import type { Corners, Vec3 } from "../net/protocol";
 
 const COORDINATE_TOLERANCE = 1e-9;
@@ -29,7 +31,7 @@ export function contains(corners: Corners, point: Vec3): boolean {
 export function containedShare(operation: Operation, cage: Posed, outer: Corners | null): number {
   if (outer === null) return 1;
   const inside = (t: number): boolean =>
-    apply(scaleOperation(operation, t), cage).corners.every((corner) => contains(outer, corner));
+    handlesOf(apply(scaleOperation(operation, t), cage)).every((handle) => contains(outer, handle));
   if (inside(1) || !inside(0)) return 1;
   const steps = operation.kind === "rotate" ? 16 : 4;
   let high = 1;

@@ -3,53 +3,44 @@
  * degrees, intrinsic XYZ; rotation, scaling and shear are about the cage's pivot.
  */
 import { Euler, MathUtils, Matrix3, Matrix4, Quaternion, Vector3 } from "three";
-import { edgeDirections, nearestRotation } from "./cage";
+import { edgeDirections, nearestRotation, type Posed } from "./cage";
+import { movePoints } from "./point_cages";
 import type { Corners, DragMove, Vec3 } from "../net/protocol";
 
 export type Operation = DragMove["operation"];
 export type Axes = "world" | "cage";
 
-export interface Posed {
-  corners: Corners;
-  pivot: Vec3;
-}
-
-/** The cage after the operation; only a translation moves the pivot. */
-export function apply(operation: Operation, { corners, pivot }: Posed): Posed {
+/**
+ * The cage after the operation; only a translation moves the pivot. Bends, twists and tapers, and motions of corners of
+ * a lattice, are the server's: the cage stays until its answer.
+ */
+export function apply(operation: Operation, cage: Posed): Posed {
+  const { corners, pivot } = cage;
+  const linear = (matrix: Matrix3): Posed => mapped(cage, (p) => transformAboutPivot(p, pivot, matrix));
   switch (operation.kind) {
     case "translate":
-      return {
-        corners: moveCorners(corners, [0, 1, 2, 3, 4, 5, 6, 7], operation.by),
-        pivot: addVectors(pivot, operation.by),
-      };
+      return { ...mapped(cage, (p) => addVectors(p, operation.by)), pivot: addVectors(pivot, operation.by) };
     case "move_corners":
-      return { corners: moveCorners(corners, operation.corners, operation.by), pivot };
+      return cage.points ? cage : { ...cage, corners: moveCorners(corners, operation.corners, operation.by) };
+    case "move_point":
+      return movePoints(cage, [operation.point], operation.by, null);
+    case "move_points": {
+      const { points, by, radius = 0, falloff = "smooth" } = operation;
+      return movePoints(cage, points, by, radius > 0 ? { radius, curve: falloff } : null);
+    }
     case "rotate":
-      return {
-        corners: transformAboutPivot(
-          corners,
-          pivot,
-          rotationMatrix(operation.rotation_deg, operation.axes, corners),
-        ),
-        pivot,
-      };
+      return linear(rotationMatrix(operation.rotation_deg, operation.axes, corners));
     case "scale":
-      return {
-        corners: transformAboutPivot(
-          corners,
-          pivot,
-          inWorldAxes(diagonal(operation.by), operation.axes, corners),
-        ),
-        pivot,
-      };
+      return linear(inWorldAxes(diagonal(operation.by), operation.axes, corners));
     case "shear": {
       const { xy = 0, xz = 0, yx = 0, yz = 0, zx = 0, zy = 0 } = operation;
       const shear = new Matrix3().set(1, xy, xz, yx, 1, yz, zx, zy, 1);
-      return {
-        corners: transformAboutPivot(corners, pivot, inWorldAxes(shear, operation.axes, corners)),
-        pivot,
-      };
+      return linear(inWorldAxes(shear, operation.axes, corners));
     }
+    case "bend":
+    case "twist":
+    case "taper":
+      return cage;
   }
 }
 
@@ -58,6 +49,8 @@ export function scaleOperation(operation: Operation, t: number): Operation {
   switch (operation.kind) {
     case "translate":
     case "move_corners":
+    case "move_point":
+    case "move_points":
       return { ...operation, by: scaleVector(operation.by, t) };
     case "rotate": {
       const full = quaternionFromDegrees(operation.rotation_deg);
@@ -70,6 +63,11 @@ export function scaleOperation(operation: Operation, t: number): Operation {
       const { xy = 0, xz = 0, yx = 0, yz = 0, zx = 0, zy = 0 } = operation;
       return { ...operation, xy: xy * t, xz: xz * t, yx: yx * t, yz: yz * t, zx: zx * t, zy: zy * t };
     }
+    case "bend":
+    case "twist":
+      return { ...operation, degrees: t * operation.degrees };
+    case "taper":
+      return { ...operation, factor: operation.factor ** t };
   }
 }
 
@@ -80,6 +78,8 @@ export function operationSize(operation: Operation): number {
   switch (operation.kind) {
     case "translate":
     case "move_corners":
+    case "move_point":
+    case "move_points":
       return Math.hypot(...operation.by);
     case "rotate":
       return MathUtils.radToDeg(quaternionFromDegrees(operation.rotation_deg).angleTo(new Quaternion()));
@@ -89,6 +89,11 @@ export function operationSize(operation: Operation): number {
       const { xy = 0, xz = 0, yx = 0, yz = 0, zx = 0, zy = 0 } = operation;
       return Math.hypot(xy, xz, yx, yz, zx, zy);
     }
+    case "bend":
+    case "twist":
+      return Math.abs(operation.degrees);
+    case "taper":
+      return Math.abs(Math.log(operation.factor));
   }
 }
 
@@ -106,6 +111,8 @@ export function snapOperation(operation: Operation, steps: SnapSteps): Operation
   switch (operation.kind) {
     case "translate":
     case "move_corners":
+    case "move_point":
+    case "move_points":
       return { ...operation, by: to(operation.by, steps.length) };
     case "rotate":
       return { ...operation, rotation_deg: to(operation.rotation_deg, steps.angle) };
@@ -115,6 +122,9 @@ export function snapOperation(operation: Operation, steps: SnapSteps): Operation
         by: to(operation.by, steps.factor).map((s) => Math.max(s, steps.factor)) as Vec3,
       };
     case "shear":
+    case "bend":
+    case "twist":
+    case "taper":
       return operation;
   }
 }
@@ -133,13 +143,18 @@ export function describeOperation(operation: Operation): string {
   switch (operation.kind) {
     case "translate":
     case "move_corners":
+    case "move_point":
+    case "move_points":
       return three(operation.by, 3);
     case "rotate":
       return `${operation.rotation_deg.map((x) => roundDecimals(x, 1).toFixed(1)).join("°  ")}°`;
     case "scale":
       return `× ${three(operation.by, 2)}`;
     case "shear":
-      return "shear";
+    case "bend":
+    case "twist":
+    case "taper":
+      return operation.kind;
   }
 }
 
@@ -181,11 +196,16 @@ function diagonal([x, y, z]: Vec3): Matrix3 {
   return new Matrix3().set(x, 0, 0, 0, y, 0, 0, 0, z);
 }
 
-function transformAboutPivot(corners: Corners, pivot: Vec3, matrix: Matrix3): Corners {
+function mapped(cage: Posed, map: (point: Vec3) => Vec3): Posed {
+  const corners = cage.corners.map(map) as Corners;
+  return cage.points === undefined
+    ? { ...cage, corners }
+    : { ...cage, corners, points: cage.points.map(map) };
+}
+
+function transformAboutPivot(point: Vec3, pivot: Vec3, matrix: Matrix3): Vec3 {
   const center = new Vector3(...pivot);
-  return corners.map((c) =>
-    new Vector3(...c).sub(center).applyMatrix3(matrix).add(center).toArray(),
-  ) as Corners;
+  return new Vector3(...point).sub(center).applyMatrix3(matrix).add(center).toArray();
 }
 
 function moveCorners(corners: Corners, which: readonly number[], by: Vec3): Corners {

@@ -1,5 +1,6 @@
 /** Parts of cages under a pixel of the screen. */
-import { EDGES, FACES, faceNormal, centroid, type CagePart } from "./cage";
+import { EDGES, FACES, faceNormal, centroid, type CagePart, type Posed } from "./cage";
+import { cageLines, handlesOf } from "./point_cages";
 import type { Corners, Vec3 } from "../net/protocol";
 
 export interface ScreenPoint {
@@ -46,11 +47,22 @@ export function pickPart(
 }
 
 /** The corner of a cage at pixel (x, y), or null. */
-export function pickCorner(x: number, y: number, corners: Corners, project: Project): CagePart | null {
+export function pickCorner(
+  x: number,
+  y: number,
+  corners: readonly Vec3[],
+  project: Project,
+  kind: "corner" | "point" = "corner",
+): CagePart | null {
   return closestPart(
-    "corner",
+    kind,
     corners.map((corner) => depthWithin(project(corner), x, y, PICK_RADIUS_PIXELS.corner)),
   );
+}
+
+/** The corner of a box, or the control point of another cage, at pixel (x, y), or null. */
+export function pickHandle(x: number, y: number, cage: Posed, project: Project): CagePart | null {
+  return pickCorner(x, y, handlesOf(cage), project, cage.points === undefined ? "corner" : "point");
 }
 
 /** Centers [3] of the faces turned to the eye; null for the other faces. */
@@ -63,12 +75,13 @@ export function visibleFaceCenters(corners: Corners, eye: Vec3): (Vec3 | null)[]
   });
 }
 
-/** Distance in pixels from (x, y) to the closest edge of a cage on the screen. */
-export function distanceToEdges(x: number, y: number, corners: Corners, project: Project): number {
-  const points = corners.map(project);
-  return Math.min(
-    ...EDGES.map(([i, j]) => segmentDistance(points[i], points[j], x, y)?.distance ?? Infinity),
+/** Distance in pixels from (x, y) to the closest line, or control point, of a cage on the screen. */
+export function distanceToCage(x: number, y: number, cage: Posed, project: Project): number {
+  const lines = cageLines(cage).map(
+    ([from, to]) => segmentDistance(project(from), project(to), x, y)?.distance ?? Infinity,
   );
+  const points = (cage.points ?? []).map(project).filter(({ depth }) => depth > 0);
+  return Math.min(...lines, ...points.map((p) => Math.hypot(p.x - x, p.y - y)));
 }
 
 function closestPart(kind: CagePart["kind"], depths: (number | null)[]): CagePart | null {

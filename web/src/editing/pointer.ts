@@ -1,11 +1,12 @@
 /** Mouse input of the canvas; precedence: corners, gizmo, faces and edges, then the view. */
 import { Plane, Vector3 } from "three";
-import { partCorners, halfExtent, faceNormal, centroid, type CagePart } from "./cage";
+import { partCorners, halfExtent, faceNormal, type CagePart } from "./cage";
 import type { App } from "../app/app";
 import { targetCage } from "./drag";
-import { moveCornersBy, closestPointOnLine, intersectPlane } from "./gestures";
+import { asPointMove, moveCornersBy, closestPointOnLine, intersectPlane } from "./gestures";
 import { snapLength, snapOperation, type Operation } from "./operations";
-import { distanceToEdges, pickPart, pickCorner } from "./picking";
+import { distanceToCage, pickHandle, pickPart } from "./picking";
+import { middleOf, steppedRadius, type Proportional } from "./point_cages";
 import { draggableCages, shownCages } from "./cage_overlay";
 import { dragObstacle, selectedEdit, showsCages, dragTarget, type Hover } from "../app/store";
 
@@ -52,6 +53,12 @@ export class Pointer {
     canvas.addEventListener("pointercancel", () => this.cancel());
     canvas.addEventListener("pointerleave", () => this.leave());
     canvas.addEventListener("dblclick", (event) => this.place(event));
+    const wheel = (event: WheelEvent): void => {
+      if (event.deltaY === 0 || !this.resizeReach(event.deltaY < 0 ? 1 : -1)) return;
+      event.preventDefault();
+      event.stopImmediatePropagation();
+    };
+    canvas.addEventListener("wheel", wheel, { capture: true, passive: false });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   }
 
@@ -84,8 +91,30 @@ export class Pointer {
   applyMotion(): void {
     if (this.hold === null) return;
     const raw = this.operation(this.hold);
+    const { drag } = this.app;
     this.appliedAt = { ...this.position };
-    if (raw !== null) this.app.moveDrag(this.snap(raw), this.latestEvent.time);
+    if (raw === null || drag === null) return;
+    const cage = targetCage(drag.start, drag.target);
+    this.app.moveDrag(asPointMove(this.snap(raw), cage, this.proportional), this.latestEvent.time);
+  }
+
+  /** Changes the radius of proportional editing by some steps; false without such a drag. */
+  resizeReach(steps: number): boolean {
+    const { store, drag } = this.app;
+    if (this.hold === null || drag === null || this.proportional === null) return false;
+    const extent = halfExtent(drag.start.deformed.corners);
+    store.set({ proportionalRadius: steppedRadius(this.proportional.radius, steps, extent) });
+    this.applyMotion();
+    return true;
+  }
+
+  /** Radius and curve by which points around the dragged ones go along; null where they stay. */
+  private get proportional(): Proportional | null {
+    const { proportional, proportionalRadius, curve } = this.app.store.now;
+    const { drag } = this.app;
+    if (!proportional || drag === null || targetCage(drag.start, drag.target).points === undefined)
+      return null;
+    return { radius: proportionalRadius ?? halfExtent(drag.start.deformed.corners), curve };
   }
 
   /** Applies the mouse's position if it has changed. */
@@ -176,15 +205,16 @@ export class Pointer {
     const { project } = this.app.viewport;
     const { x, y } = this.position;
     const cages = draggableCages(now, shownCages(edit, this.app.drag));
-    for (const { cage, corners } of cages) {
-      const corner = pickCorner(x, y, corners, project);
+    for (const { cage, posed } of cages) {
+      const corner = pickHandle(x, y, posed, project);
       if (corner !== null) return { part: corner, cage };
     }
     const axis = this.app.gizmo.hover(this.app.viewport.device(x, y));
     if (axis !== null && axis !== FREE_ROTATION) return null;
     const eye = this.app.viewport.camera.position.toArray();
-    for (const { cage, corners } of cages) {
-      const part = pickPart(x, y, { corners, eye }, project);
+    for (const { cage, posed } of cages) {
+      if (posed.points !== undefined) continue;
+      const part = pickPart(x, y, { corners: posed.corners, eye }, project);
       if (part === null) continue;
       this.app.gizmo.clearHover();
       return { part, cage };
@@ -210,10 +240,12 @@ export class Pointer {
     const drag = this.app.beginDrag(now.mode === "edit" ? "field" : hover.cage);
     if (drag === null) return;
     if (!together && now.corners.length > 0) this.app.store.set({ corners: [] });
-    const cage = targetCage(drag.start, drag.target).corners;
-    const at = new Vector3(...centroid(cage, own));
+    const cage = targetCage(drag.start, drag.target);
+    const at = new Vector3(...middleOf(cage, own));
     const line =
-      hover.part.kind === "face" && !together ? new Vector3(...faceNormal(cage, hover.part.index)) : null;
+      hover.part.kind === "face" && !together
+        ? new Vector3(...faceNormal(cage.corners, hover.part.index))
+        : null;
     const plane = new Plane().setFromNormalAndCoplanarPoint(this.app.viewport.forward, at);
     this.hold = { kind: "part", corners, at, grabbed: at, plane, line };
     this.hold.grabbed = this.targetPosition(this.hold) ?? at;
@@ -259,10 +291,10 @@ export class Pointer {
       .filter((edit) => edit.enabled)
       .map((edit) => {
         const cages = shownCages(edit, this.app.drag);
-        const corners = targetCage(cages, dragTarget(now)).corners;
+        const cage = targetCage(cages, dragTarget(now));
         return {
           id: edit.id,
-          distance: distanceToEdges(this.position.x, this.position.y, corners, this.app.viewport.project),
+          distance: distanceToCage(this.position.x, this.position.y, cage, this.app.viewport.project),
         };
       })
       .filter(({ distance }) => distance < LINE_RADIUS_PIXELS)
@@ -277,7 +309,8 @@ export class Pointer {
     if (!this.firstPress.release) return;
     const { width, height } = this.app.viewport.points;
     this.app.expectEdit();
-    this.app.send({ type: "place", x: clamp(this.position.x / width), y: clamp(this.position.y / height) });
+    const at = { x: clamp(this.position.x / width), y: clamp(this.position.y / height) };
+    this.app.send({ type: event.ctrlKey || event.metaKey ? "place_point" : "place", ...at });
   }
 
   private travelPixels(): number {

@@ -47,7 +47,10 @@ export type PageMessage =
   | SelectFloaters
   | ChangeSelection
   | SelectionCage
-  | Isolate;
+  | Isolate
+  | PlacePoint
+  | Subdivide
+  | PointReach;
 export type ServerMessage = Hello | State | Dragged | Answer | Notice | Preview | Preparing | Job;
 
 /**
@@ -57,7 +60,17 @@ export interface Apply {
   type: "apply";
   edit: number;
   target: "field" | "inner" | "outer" | "both";
-  operation: TranslateBy | RotateBy | ScaleBy | ShearBy | MoveCornersBy;
+  operation:
+    | TranslateBy
+    | RotateBy
+    | ScaleBy
+    | ShearBy
+    | MoveCornersBy
+    | MovePointBy
+    | MovePointsBy
+    | BendBy
+    | TwistBy
+    | TaperBy;
 }
 /**
  * Move the cage.
@@ -102,6 +115,52 @@ export interface MoveCornersBy {
   kind: "move_corners";
   corners: number[];
   by: Vec3;
+}
+/**
+ * Move one control point.
+ */
+export interface MovePointBy {
+  kind: "move_point";
+  point: number;
+  by: Vec3;
+}
+/**
+ * Move control points together; those within a radius > 0 around them go along in part.
+ */
+export interface MovePointsBy {
+  kind: "move_points";
+  points: number[];
+  by: Vec3;
+  radius?: number;
+  falloff?: "smooth" | "sphere" | "root" | "sharp" | "linear";
+}
+/**
+ * Bend a lattice along an axis of its own, `towards` another ("": the next); see `operations.Bend`.
+ */
+export interface BendBy {
+  kind: "bend";
+  axis: "x" | "y" | "z";
+  degrees: number;
+  towards?: ("x" | "y" | "z") | "";
+  fixed?: "start" | "middle" | "end";
+}
+/**
+ * Twist a lattice about an axis of its own.
+ */
+export interface TwistBy {
+  kind: "twist";
+  axis: "x" | "y" | "z";
+  degrees: number;
+  fixed?: "start" | "middle" | "end";
+}
+/**
+ * Scale a lattice across an axis of its own, evenly to a factor at its end.
+ */
+export interface TaperBy {
+  kind: "taper";
+  axis: "x" | "y" | "z";
+  factor: number;
+  fixed?: "start" | "middle" | "end";
 }
 /**
  * A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying), its "grid"; "path".
@@ -212,7 +271,17 @@ export interface DragEnd {
   type: "drag_end";
   drag: number;
   seq: number;
-  operation: TranslateBy | RotateBy | ScaleBy | ShearBy | MoveCornersBy;
+  operation:
+    | TranslateBy
+    | RotateBy
+    | ScaleBy
+    | ShearBy
+    | MoveCornersBy
+    | MovePointBy
+    | MovePointsBy
+    | BendBy
+    | TwistBy
+    | TaperBy;
 }
 /**
  * Where the drag is: the whole operation since its beginning.
@@ -221,7 +290,17 @@ export interface DragMove {
   type: "drag";
   drag: number;
   seq: number;
-  operation: TranslateBy | RotateBy | ScaleBy | ShearBy | MoveCornersBy;
+  operation:
+    | TranslateBy
+    | RotateBy
+    | ScaleBy
+    | ShearBy
+    | MoveCornersBy
+    | MovePointBy
+    | MovePointsBy
+    | BendBy
+    | TwistBy
+    | TaperBy;
 }
 /**
  * Images that the page draws itself: none, those during motion, or all. It receives the edits instead.
@@ -313,6 +392,16 @@ export interface Place {
   y?: number | null;
 }
 /**
+ * A new edit of one control point, on the surface seen at a pixel (x, y in [0,1] of the picture).
+ *
+ * Without a pixel it goes to the middle of the visible surface.
+ */
+export interface PlacePoint {
+  type: "place_point";
+  x?: number | null;
+  y?: number | null;
+}
+/**
  * Where on the path the page is; passed over where that preview is over.
  */
 export interface Play {
@@ -333,6 +422,15 @@ export interface PlayBegin {
 export interface PlayEnd {
   type: "play_end";
   play: number;
+}
+/**
+ * Reach of an edit's control points, world units, and the curve by which it fades; omitted ones stay.
+ */
+export interface PointReach {
+  type: "point_reach";
+  edit: number;
+  radius?: number | null;
+  falloff?: ("smooth" | "sphere" | "root" | "sharp" | "linear") | null;
 }
 /**
  * The page has shown an image, or its edits; until then the server sends at most one more.
@@ -444,6 +542,19 @@ export interface SetPath {
   loop?: boolean;
 }
 /**
+ * The inner cage becomes a lattice with that many cells along its x, y and z.
+ */
+export interface Subdivide {
+  type: "subdivide";
+  edit: number;
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  cells: [number, number, number];
+  interpolation?: "linear" | "bspline";
+}
+/**
  * The answer to an `ask`: a point and its normal, a text, a grid, the path, sources, or a histogram; or
  * nothing.
  */
@@ -487,6 +598,8 @@ export interface Dragged {
   inner: Corners;
   deformed: Corners;
   outer: Corners | null;
+  points: Vec3[];
+  deformed_points: Vec3[];
 }
 /**
  * One edit as pages show it; corners in world units, deformed: the inner cage after its operations.
@@ -509,11 +622,25 @@ export interface EditState {
   inner: Corners;
   deformed: Corners;
   outer: Corners | null;
+  cage: "box" | "lattice" | "points";
+  points: PointsState | null;
+  outer_follows: boolean;
   pivot: Vec3;
   inner_pivot: Vec3;
   outer_pivot: Vec3 | null;
   operations: string[];
   problem: string | null;
+}
+/**
+ * Control points of an edit's inner cage, world units: of a lattice, or on their own with a radius.
+ */
+export interface PointsState {
+  canonical: Vec3[];
+  deformed: Vec3[];
+  shape: [number, number, number] | null;
+  interpolation: ("linear" | "bspline") | null;
+  radius: number | null;
+  falloff: ("smooth" | "sphere" | "root" | "sharp" | "linear") | null;
 }
 /**
  * First message, with the edited scene. `page` identifies this page among the open ones.

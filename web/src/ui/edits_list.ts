@@ -2,6 +2,7 @@
 import {
   ChevronDown,
   ChevronUp,
+  CircleDot,
   ClipboardPaste,
   Copy,
   Eye,
@@ -62,6 +63,12 @@ export function editsList(app: App, actions: Actions, dialogs: Pick<Dialogs, "pa
       "New edit in the middle of the view; or double-click the picture",
       () => actions.place(),
       "add",
+    ),
+    iconButton(
+      CircleDot,
+      "New control point in the middle of the view; or Ctrl+double-click the picture",
+      () => actions.placePoint(),
+      "add-point",
     ),
     iconButton(ClipboardPaste, "Paste from another scene… (Shift+V)", () => dialogs.paste(), "paste-scene"),
     button(Copy, "Duplicate (Ctrl+D)", () => actions.duplicate(), "duplicate"),

@@ -8,6 +8,7 @@ import { roundDecimals, type Operation } from "../editing/operations";
 import type { Change, EditState, Vec3 } from "../net/protocol";
 import { canFill, canRelight, selectedEdit, dragTarget } from "../app/store";
 import { h, section } from "./dom";
+import { pointOptions } from "./point_options";
 
 interface Point {
   x: number;
@@ -126,6 +127,8 @@ export function options(app: App, actions: Actions): HTMLElement {
   cages.addBinding(model, "margin", { label: "Margin", min: 0.001, format: short });
   cages.addButton({ title: "Outer cage by margin" }).on("click", () => actions.outerMargin(model.margin));
 
+  const points = pointOptions(app, actions, pane);
+
   const removeLast = h(
     "button",
     {
@@ -177,14 +180,17 @@ export function options(app: App, actions: Actions): HTMLElement {
     }
     const [shell, falloff, width, lattice, error] = continuous;
     for (const binding of continuous) binding.hidden = edit.kind !== "continuous";
-    falloff.hidden = width.hidden = edit.kind !== "continuous" || edit.shell !== "flow";
+    falloff.hidden = width.hidden =
+      edit.kind !== "continuous" || edit.shell !== "flow" || edit.cage === "points";
     error.hidden = lattice.hidden || edit.lattice === 0;
     kinds.hidden = edit.source !== null;
     from.hidden = edit.source === null;
     relight.hidden = !canRelight(now);
     fills.hidden = !canFill(now);
     for (const binding of [shell, lattice, fills, relight]) binding.disabled = edit.locked;
+    if (edit.cage !== "box") shell.disabled = true;
     filling = true;
+    points.show(edit);
     pane.refresh();
     filling = false;
     operations.replaceChildren(...edit.operations.map((text) => h("li", {}, text)));

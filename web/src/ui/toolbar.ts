@@ -11,6 +11,7 @@ import {
   Paintbrush,
   PaintBucket,
   PencilRuler,
+  Radius,
   Rotate3d,
   Scale3d,
   Spline,
@@ -50,7 +51,16 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
     iconButton(Magnet, "Snap; Ctrl does the opposite while held", () => actions.toggle("snap"), "snap"),
     (e) => e.snap,
   );
-  editing.push(snap);
+  const proportional = add(
+    iconButton(
+      Radius,
+      "Proportional editing of control points (O); the wheel changes its radius while dragging",
+      () => actions.toggleProportional(false),
+      "proportional",
+    ),
+    (e) => e.proportional,
+  );
+  editing.push(snap, proportional);
   const cages = group(
     add(
       iconButton(Square, "Move the inner cage (C)", () => actions.setCage("inner"), "cage-inner"),
@@ -126,16 +136,20 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
     ),
     group(
       snap,
+      proportional,
       add(
-        iconButton(Axis3d, "Show or hide the cages (O)", () => actions.toggle("cages"), "cages"),
+        iconButton(Axis3d, "Show or hide the cages (Shift+O)", () => actions.toggle("cages"), "cages"),
         (e) => e.cages,
       ),
     ),
   );
-  app.store.watch(["hello", "tool", "selecting", "mode", "cage", "axes", "snap", "cages"], (now) => {
-    for (const element of editing) element.hidden = isReadOnly(now);
-    for (const [button, on] of lit) button.classList.toggle("on", on(now));
-    for (const element of setOnly) element.classList.toggle("away", now.mode !== "set" || isReadOnly(now));
-  });
+  app.store.watch(
+    ["hello", "tool", "selecting", "mode", "cage", "axes", "snap", "proportional", "cages"],
+    (now) => {
+      for (const element of editing) element.hidden = isReadOnly(now);
+      for (const [button, on] of lit) button.classList.toggle("on", on(now));
+      for (const element of setOnly) element.classList.toggle("away", now.mode !== "set" || isReadOnly(now));
+    },
+  );
   return bar;
 }

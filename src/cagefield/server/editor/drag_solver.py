@@ -17,6 +17,7 @@ from cagefield.errors import CagefieldError, EditError
 from cagefield.geometry.cage import EDGES, FACES, Cage
 from cagefield.server.editor.document import Entry
 from cagefield.server.editor.pasting import crop_paste, crop_problem
+from cagefield.server.editor.point_edits import check_operation
 from cagefield.server.editor.validity import INSIDE_OUT, cause, problem
 
 _ROUNDING = 1e-3
@@ -61,10 +62,12 @@ def move(entry: Entry, target: Target, operation: Operation) -> Moved:
     edit = entry.edit
     if entry.locked:
         raise EditError(f'edit "{edit.name}" is locked; unlock it to change it')
+    outer = edit.shell_settings.outer
+    if target == "outer" and outer is None:
+        raise EditError(f'edit "{edit.name}" has no outer cage; give it one with "outer margin"')
+    check_operation(outer if target == "outer" and outer is not None else edit.inner, operation)
     if target == "field":
         return _with_field(edit, operation)
-    if target == "outer" and edit.shell_settings.outer is None:
-        raise EditError(f'edit "{edit.name}" has no outer cage; give it one with "outer margin"')
     return _cages_alone(edit, target, operation)
 
 
@@ -75,7 +78,12 @@ def appended(operations: tuple[Operation, ...], last: Operation) -> tuple[Operat
 
 
 def _sum(first: Operation, second: Operation) -> Operation | None:
-    """One operation in place of two moves of the same corners or of the whole cage; None for any others."""
+    """One operation in place of two moves of the same corners or of the whole cage; None for any others.
+
+    Moves with a falloff stay apart: the second one's weights are those of the points as the first left them.
+    """
+    if isinstance(first, ops.MovePoints) and first.radius > 0.0:
+        return None
     turning = ops.Rotate | ops.Scale | ops.Shear | ops.Bend | ops.Twist | ops.Taper
     if isinstance(first, turning) or isinstance(second, turning) or type(first) is not type(second):
         return None

@@ -32,6 +32,7 @@ from cagefield.server.editor.mirror import mirror_edit
 from cagefield.server.editor.pasting import crop_paste
 from cagefield.server.editor.path_edits import edits_at_time
 from cagefield.server.editor.path_preview import Preview
+from cagefield.server.editor.point_edits import edit_of_point, subdivided, with_reach
 from cagefield.server.editor.validity import check_has_corners, problem
 from cagefield.typing import Array
 
@@ -211,6 +212,25 @@ class Session:
         inner, outer = cage_pair_around(point, view_height, self.bounds, self.voxel)
         edit = Edit.continuous(inner, outer, name=fresh_name(self.document, "edit"), lattice=LATTICE)
         return self._add("Place cages", edit)
+
+    def place_point(self, point: Array, view_height: float) -> int:
+        """The number of a new edit, selected, of one control point [3] on a surface."""
+        inner, _ = cage_pair_around(point, view_height, self.bounds, self.voxel)
+        edit = edit_of_point(inner, name=fresh_name(self.document, "points"), lattice=LATTICE)
+        return self._add("Place control point", edit)
+
+    def subdivide(self, number: int, cells: tuple[int, int, int], interpolation: str) -> None:
+        """The inner cage as a lattice of `cells` along its axes."""
+        entry = self._unlocked(number)
+        edit = subdivided(entry.edit, cells, interpolation)
+        self._put(f"Subdivide{suffix_for(entry)}", replace(entry, edit=edit))
+
+    def point_reach(self, number: int, radius: float | None, falloff: str | None) -> None:
+        """The radius and the falloff of control points; None leaves either."""
+        entry = self._unlocked(number)
+        edit = with_reach(entry.edit, radius, falloff)
+        if edit != entry.edit:
+            self._put(f"Reach{suffix_for(entry)}", replace(entry, edit=edit))
 
     def paste(self, edit: Paste) -> int:
         """The number of a new edit that pastes from another scene, selected."""

@@ -6,7 +6,7 @@ generated from these.
 One WebSocket per page carries text messages, one JSON object each, with a `type`; and, from server to page,
 pictures as binary messages (see `server_messages.PictureHeader`). Lengths are world units, angles degrees;
 c2w is OpenGL camera-to-world, row by row; pixels are counted from the left and the top. Cages are given by
-their 8 corners, corner k = x + 2y + 4z.
+their 8 corners, corner k = x + 2y + 4z; lattices and edits of control points by these points as well.
 
 A drag goes: `drag_begin`, any number of `drag` (each states the whole operation since the beginning, so
 the server may skip all but the newest), then `drag_end` or `drag_cancel`. The server answers with `dragged`:
@@ -33,6 +33,8 @@ View: TypeAlias = Literal["colour", "depth", "opacity", "normals"]
 DrawnHere: TypeAlias = Literal["nothing", "moving", "all"]
 ShellName: TypeAlias = Literal["flow", "trilinear"]
 FalloffName: TypeAlias = Literal["smooth", "linear"]
+CurveName: TypeAlias = Literal["smooth", "sphere", "root", "sharp", "linear"]
+InterpolationName: TypeAlias = Literal["linear", "bspline"]
 FillName: TypeAlias = Literal["surroundings", "none"]
 RelightName: TypeAlias = Literal["occlusion", "shadow", "none"]
 JobKind: TypeAlias = Literal["test_views", "camera_path"]
@@ -40,6 +42,9 @@ SplatForm: TypeAlias = Literal["ply", "compressed.ply", "spz", "sog", "splat", "
 Level: TypeAlias = Literal["info", "warning", "error"]
 
 Corner: TypeAlias = Annotated[int, Field(ge=0, le=7)]
+Point: TypeAlias = Annotated[int, Field(ge=0, lt=512)]
+"""Number of a control point; of a lattice, x fastest."""
+Reach: TypeAlias = Annotated[float, Field(gt=0, lt=1e6)]
 Text: TypeAlias = Annotated[str, Field(max_length=200)]
 EditId: TypeAlias = Annotated[int, Field(ge=1)]
 

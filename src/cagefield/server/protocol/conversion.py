@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Keyframe, Timeline
-from cagefield.edits import Flow, Paste
+from cagefield.edits import Edit, Flow, Paste
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import CastShadow
 from cagefield.errors import CameraError
-from cagefield.geometry.cage import Cage
+from cagefield.geometry.cage import Cage, LatticeCage
+from cagefield.geometry.control_points import ControlPoints
 from cagefield.selection.element_selection import Selection
 from cagefield.server.editor.document import Entry
 from cagefield.server.editor.drag_solver import Moved, move_corners
@@ -41,7 +42,17 @@ def operation_of(message: operation_messages.OperationMessage) -> Operation:
         return ops.Shear(
             message.xy, message.xz, message.yx, message.yz, message.zx, message.zy, axes=message.axes
         )
-    return move_corners(tuple(message.corners), message.by)
+    if isinstance(message, operation_messages.MoveCornersBy):
+        return move_corners(tuple(message.corners), message.by)
+    if isinstance(message, operation_messages.MovePointBy):
+        return ops.MovePoint(message.point, message.by)
+    if isinstance(message, operation_messages.MovePointsBy):
+        return ops.MovePoints(tuple(message.points), message.by, message.radius, message.falloff)
+    if isinstance(message, operation_messages.BendBy):
+        return ops.Bend(message.axis, message.degrees, message.towards, message.fixed)
+    if isinstance(message, operation_messages.TwistBy):
+        return ops.Twist(message.axis, message.degrees, message.fixed)
+    return ops.Taper(message.axis, message.factor, message.fixed)
 
 
 def camera_of(message: common.CameraMessage) -> Camera:
@@ -88,11 +99,40 @@ def corners(cage: Cage) -> Corners:
     return cast(Corners, tuple(vec3(corner) for corner in cage.corners))
 
 
+def points_of(cage: Cage) -> list[Vec3]:
+    """Control points of a cage as a message has them; none of a box."""
+    return [] if cage.is_hexahedron else [vec3(point) for point in cage.handles]
+
+
+def points_state(edit: Edit) -> server_messages.PointsState | None:
+    """Control points of an edit's inner cage; None of a box."""
+    inner = edit.inner
+    if inner.is_hexahedron:
+        return None
+    on_their_own = inner if isinstance(inner, ControlPoints) else None
+    lattice = inner if isinstance(inner, LatticeCage) else None
+    return server_messages.PointsState(
+        canonical=points_of(inner),
+        deformed=points_of(edit.deformed),
+        shape=None if lattice is None else lattice.shape,
+        interpolation=None if lattice is None else cast(Any, lattice.interpolation),
+        radius=None if on_their_own is None else on_their_own.radius,
+        falloff=None if on_their_own is None else cast(Any, on_their_own.falloff),
+    )
+
+
+def _cage_kind(points: server_messages.PointsState | None) -> Literal["box", "lattice", "points"]:
+    if points is None:
+        return "box"
+    return "points" if points.shape is None else "lattice"
+
+
 def edit_state(
     entry: Entry, problem: str | None, error: tuple[float, float] | None
 ) -> server_messages.EditState:
     """One edit as pages show it; `error` is its lattice's, in voxels."""
     edit, settings = entry.edit, entry.edit.shell_settings
+    points = points_state(edit)
     flow = settings.shell if isinstance(settings.shell, Flow) else Flow()
     return server_messages.EditState(
         id=entry.id,
@@ -112,6 +152,9 @@ def edit_state(
         inner=corners(cage_in_scene(edit)),
         deformed=corners(edit.deformed),
         outer=None if settings.outer is None else corners(settings.outer),
+        cage=_cage_kind(points),
+        points=points,
+        outer_follows=settings.outer is not None and settings.outer.follows_edit,
         pivot=vec3(edit.deformed.pivot),
         inner_pivot=vec3(cage_in_scene(edit).pivot),
         outer_pivot=None if settings.outer is None else vec3(settings.outer.pivot),
@@ -170,6 +213,8 @@ def dragged_of(drag: int, seq: int, moved: Moved) -> server_messages.Dragged:
         inner=corners(cage_in_scene(edit)),
         deformed=corners(edit.deformed),
         outer=None if outer is None else corners(outer),
+        points=points_of(edit.inner),
+        deformed_points=points_of(edit.deformed),
     )
 
 

@@ -6,7 +6,11 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, FiniteFloat
 
-from cagefield.server.protocol.common import Axes, Corner, Message, Vec3
+from cagefield.server.protocol.common import Axes, Corner, CurveName, Message, Point, Vec3
+
+AxisName: TypeAlias = Literal["x", "y", "z"]
+FixedEnd: TypeAlias = Literal["start", "middle", "end"]
+Angle: TypeAlias = Annotated[float, Field(ge=-3600, le=3600)]
 
 
 class TranslateBy(Message):
@@ -57,6 +61,62 @@ class MoveCornersBy(Message):
     by: Vec3
 
 
+class MovePointBy(Message):
+    """Move one control point."""
+
+    kind: Literal["move_point"] = "move_point"
+    point: Point
+    by: Vec3
+
+
+class MovePointsBy(Message):
+    """Move control points together; those within a radius > 0 around them go along in part."""
+
+    kind: Literal["move_points"] = "move_points"
+    points: Annotated[list[Point], Field(min_length=1, max_length=512)]
+    by: Vec3
+    radius: Annotated[float, Field(ge=0, lt=1e6)] = 0.0
+    falloff: CurveName = "smooth"
+
+
+class BendBy(Message):
+    """Bend a lattice along an axis of its own, `towards` another ("": the next); see `operations.Bend`."""
+
+    kind: Literal["bend"] = "bend"
+    axis: AxisName
+    degrees: Angle
+    towards: AxisName | Literal[""] = ""
+    fixed: FixedEnd = "start"
+
+
+class TwistBy(Message):
+    """Twist a lattice about an axis of its own."""
+
+    kind: Literal["twist"] = "twist"
+    axis: AxisName
+    degrees: Angle
+    fixed: FixedEnd = "start"
+
+
+class TaperBy(Message):
+    """Scale a lattice across an axis of its own, evenly to a factor at its end."""
+
+    kind: Literal["taper"] = "taper"
+    axis: AxisName
+    factor: Annotated[float, Field(gt=0, lt=1e6)]
+    fixed: FixedEnd = "start"
+
+
 OperationMessage: TypeAlias = Annotated[
-    TranslateBy | RotateBy | ScaleBy | ShearBy | MoveCornersBy, Field(discriminator="kind")
+    TranslateBy
+    | RotateBy
+    | ScaleBy
+    | ShearBy
+    | MoveCornersBy
+    | MovePointBy
+    | MovePointsBy
+    | BendBy
+    | TwistBy
+    | TaperBy,
+    Field(discriminator="kind"),
 ]

@@ -10,9 +10,11 @@ from cagefield.server.editor.edit_kinds import Kind
 from cagefield.server.protocol.common import (
     CameraMessage,
     Corners,
+    CurveName,
     EditId,
     FalloffName,
     FillName,
+    InterpolationName,
     JobKind,
     Key,
     Level,
@@ -48,6 +50,19 @@ class Hello(Message):
     """True where the page may look and not change anything: its link is one for that."""
 
 
+class PointsState(Message):
+    """Control points of an edit's inner cage, world units: of a lattice, or on their own with a radius."""
+
+    canonical: list[Vec3]
+    deformed: list[Vec3]
+    shape: tuple[int, int, int] | None
+    """Points of a lattice along x, y and z, numbered x fastest; None for points on their own."""
+    interpolation: InterpolationName | None
+    radius: float | None
+    """Reach of points on their own, before scaling."""
+    falloff: CurveName | None
+
+
 class EditState(Message):
     """One edit as pages show it; corners in world units, deformed: the inner cage after its operations."""
 
@@ -71,6 +86,12 @@ class EditState(Message):
     inner: Corners
     deformed: Corners
     outer: Corners | None
+    cage: Literal["box", "lattice", "points"]
+    """Kind of the inner cage; corners of the last two are those of a box around them."""
+    points: PointsState | None
+    """Control points of a lattice, or points on their own."""
+    outer_follows: bool
+    """True where the outer cage is made anew with the operations, and confines none."""
     pivot: Vec3
     inner_pivot: Vec3
     outer_pivot: Vec3 | None
@@ -127,6 +148,9 @@ class Dragged(Message):
     inner: Corners
     deformed: Corners
     outer: Corners | None
+    points: list[Vec3]
+    """Control points of the inner cage, where it has them."""
+    deformed_points: list[Vec3]
 
     def redundancy_key(self) -> str:
         return self.type

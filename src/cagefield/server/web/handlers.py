@@ -15,7 +15,13 @@ from cagefield.server.editor.cage_placement import fit_to_content
 from cagefield.server.editor.edit_texts import read_edits
 from cagefield.server.editor.pasting import build_paste
 from cagefield.server.editor.session import Session
-from cagefield.server.protocol import client_messages, common, selection_messages, server_messages
+from cagefield.server.protocol import (
+    client_messages,
+    common,
+    point_messages,
+    selection_messages,
+    server_messages,
+)
 from cagefield.server.protocol.conversion import (
     cage_of,
     camera_of,
@@ -236,22 +242,36 @@ class MessageHandlers:
 
     @_handles(client_messages.Place)
     async def _place(self, message: client_messages.Place) -> None:
-        anywhere = message.x is None or message.y is None
-        x, y = (0.5, 0.5) if message.x is None or message.y is None else (message.x, message.y)
-        point, height = await self._seen(x, y, anywhere=anywhere)
+        point, height = await self._seen(message.x, message.y)
         self._session.place(point, height)
         self._coordinator.changed()
 
-    async def _seen(self, x: float, y: float, *, anywhere: bool) -> tuple[Array, float]:
-        """The point [3] of the surface seen at a pixel, and the height of the view frustum there, world
-        units.
+    @_handles(point_messages.PlacePoint)
+    async def _place_point(self, message: point_messages.PlacePoint) -> None:
+        point, height = await self._seen(message.x, message.y)
+        self._session.place_point(point, height)
+        self._coordinator.changed()
 
-        Where none is seen, `anywhere` takes the middle of the field.
+    @_handles(point_messages.Subdivide)
+    def _subdivide(self, message: point_messages.Subdivide) -> None:
+        self._session.subdivide(message.edit, message.cells, message.interpolation)
+        self._coordinator.changed()
+
+    @_handles(point_messages.PointReach)
+    def _point_reach(self, message: point_messages.PointReach) -> None:
+        self._session.point_reach(message.edit, message.radius, message.falloff)
+        self._coordinator.changed()
+
+    async def _seen(self, x: float | None, y: float | None) -> tuple[Array, float]:
+        """The point [3] of the surface at a pixel, and the view frustum's height there, world units.
+
+        Without a pixel it is in the middle of the view, or of the field where no surface is seen there.
         """
         camera = self._page.camera
         if camera is None:
             raise CagefieldError("the page has sent no camera yet; try again")
-        found = await self._surface(x, y)
+        anywhere = x is None or y is None
+        found = await self._surface(0.5 if x is None else x, 0.5 if y is None else y)
         if found is None and not anywhere:
             raise CagefieldError("there is no surface under the mouse; double-click on the object")
         point = np.array(found[0]) if found is not None else self._session.bounds.mean(axis=0)
@@ -261,7 +281,7 @@ class MessageHandlers:
     async def _paste_scene(self, message: client_messages.PasteScene) -> None:
         path = self._coordinator.store.source_of(message.source)
         box, up, own_up = await self._coordinator.ask(lambda number: LookTask(number, str(path)))
-        point, height = await self._seen(0.5, 0.5, anywhere=True)
+        point, height = await self._seen(None, None)
         edit = build_paste(
             str(path), path.stem[:100], np.array(box), np.array(up), point, np.array(own_up), height
         )
