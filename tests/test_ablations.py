@@ -141,6 +141,7 @@ def test_differences_are_white_where_there_are_none() -> None:
 # -- command -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_command(capsys: pytest.CaptureFixture[str], tmp_path: Path, bench: Workbench) -> None:
     argv = [
         "bench", "ablation", "discrete-continuous", "-o", str(tmp_path), "--workdir", str(bench.folder),

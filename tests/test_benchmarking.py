@@ -288,6 +288,7 @@ def test_scores_table_and_second_run(bench: Workbench, monkeypatch: pytest.Monke
     assert text.endswith("- Machine: a test\n") and "60 steps at 24 voxels" in text
 
 
+@pytest.mark.nightly
 def test_what_photos_of_the_truth_teach(bench: Workbench) -> None:
     """The figures are those of a second field, that saw the microphone without its base."""
     one = case("microphone", "delete_base")

@@ -221,6 +221,7 @@ def test_memory_is_that_of_this_process():
     assert block[0] == 1
 
 
+@pytest.mark.nightly
 def test_the_command_measures_rooms_and_folders(room, tmp_path, capsys):
     """Voxels, 20 steps: their figures are poor, and they are there; the room's photos are made once."""
     out, pictures = tmp_path / "table.md", tmp_path / "pictures"

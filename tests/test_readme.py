@@ -12,6 +12,7 @@ from cagefield import Scene
 from cagefield.cli import parse
 from cagefield.edits import Copy, Delete
 from cagefield.edits.edit_files import parse_edits
+from cagefield.geometry import ControlPoints, LatticeCage
 from scenes import ball_scene
 
 ROOT = Path(__file__).parents[1]
@@ -35,12 +36,15 @@ def test_edit_files(page: str) -> None:
 def test_edit_files_show_every_kind_of_edit() -> None:
     (readme,) = blocks("README.md", "yaml")
     assert [edit.name for edit in parse_edits(readme)] == ["raise the arm"]
-    text, _, moved = blocks("docs/how-to/edit-files.md", "yaml")
+    text, points, lattice, _, moved = blocks("docs/how-to/edit-files.md", "yaml")
     edits = parse_edits(text)
     assert [edit.name for edit in edits] == ["raise the arm", "a second cone", "no beacon"]
     assert isinstance(edits[1], Copy) and isinstance(edits[2], Delete)
     (cone,) = parse_edits(moved)
     assert (cone.fill, cone.relight) == ("surroundings", "none")
+    (nose,), (arm,) = (parse_edits(f"version: 1\n{snippet}") for snippet in (points, lattice))
+    assert isinstance(nose.inner, ControlPoints) and isinstance(arm.inner, LatticeCage)
+    assert nose.is_possible and arm.is_possible
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/how-to/python.md"])

@@ -204,4 +204,4 @@ def test_a_gpu_trains_as_the_cpu_does(capture, monkeypatch: pytest.MonkeyPatch, 
     assert abs(len(got.field) - len(want.field)) <= 0.03 * len(want.field)
     assert got.test_psnr == pytest.approx(want.test_psnr, abs=0.5)
     assert got.test_psnr > 18
-    np.testing.assert_allclose(got.gains, want.gains, atol=0.02)
+    np.testing.assert_allclose(got.gains, want.gains, atol=0.05)

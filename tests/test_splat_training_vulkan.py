@@ -30,6 +30,7 @@ def vulkan() -> None:
     assert started.stdout.strip() == "vulkan"
 
 
+@pytest.mark.nightly
 @pytest.mark.train
 @pytest.mark.usefixtures("vulkan")
 @pytest.mark.parametrize("name", ["test_splat_training_device.py", "test_device_sorting.py"])

@@ -44,7 +44,7 @@ export function selectionPanel(app: App, actions: Actions): HTMLElement {
     .on("change", ({ last }) => {
       if (last) selectFloaters();
     });
-  pane.addBinding(model, "margin", { label: "Margin, cells", min: 0, max: 20, step: 0.5 });
+  pane.addBinding(model, "margin", { label: "Cells around", min: 0, max: 20, step: 0.5 });
 
   function selectFloaters(): void {
     app.send({ type: "select_floaters", strength: model.strength });
