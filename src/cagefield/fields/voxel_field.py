@@ -180,6 +180,17 @@ class VoxelField:
         stored = self.vertices[slot] == linear
         return np.where(stored, slot, 0), stored
 
+    def take(self, rows: NDArray[Any]) -> VoxelField:
+        """Field with the vertices of the given rows or mask."""
+        return VoxelField(
+            self.bounds,
+            self.resolution,
+            self.vertices[rows],
+            self.density[rows],
+            self.sh[rows],
+            self.contracted,
+        )
+
     def save(self, path: str | Path) -> None:
         """Write the field to a safetensors file (float32); the folder must exist."""
         tensors = {

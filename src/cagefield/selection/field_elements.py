@@ -148,15 +148,7 @@ def without_elements(
     near_removed = _grown(state == -1)
     cell = cell_of_vertices(field)
     gone: Mask = np.asarray((state == -1) | (near_removed & ~others))
-    keep = ~gone.reshape(-1)[cell]
-    return VoxelField(
-        field.bounds,
-        field.resolution,
-        field.vertices[keep],
-        field.density[keep],
-        field.sh[keep],
-        field.contracted,
-    )
+    return field.take(~gone.reshape(-1)[cell])
 
 
 def _grown(mask: Mask) -> Mask:

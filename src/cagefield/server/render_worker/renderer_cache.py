@@ -32,7 +32,7 @@ from cagefield.server.render_worker.tasks import (
     WarmStage,
 )
 from cagefield.server.render_worker.view import Display, Region
-from cagefield.typing import Float32
+from cagefield.typing import Array, Float32
 
 if TYPE_CHECKING:
     from cagefield.rendering.renderers import InteractiveRenderer
@@ -144,6 +144,25 @@ class RendererCache:
         if shown.isolated is None:
             return self.plain, self.edited
         return self._isolated.renderers(shown.isolated)
+
+    def surface(
+        self, shown: Shown, camera: Camera, x: float, y: float, *, normals: bool = False
+    ) -> tuple[Array, Array | None] | None:
+        """(point [3], normal [3] if asked for) of the surface seen at a pixel, x and y in [0,1].
+
+        None where the picture is half empty.
+        """
+        column, row = (
+            min(int(x * camera.width), camera.width - 1),
+            min(int(y * camera.height), camera.height - 1),
+        )
+        renderer = self.renderer(shown, Refinement.DRAFT).renderer
+        frame = renderer.render(camera, normals=normals, region=(column, row, 1, 1))
+        if frame.opacity[0, 0] < 0.5:
+            return None
+        origins, directions = camera.rays(np.array([[column, row]]))
+        point = origins[0] + float(frame.depth[0, 0]) * directions[0]
+        return point, None if frame.normals is None else frame.normals[0, 0]
 
     def edits(self, values: tuple[EditValues, ...]) -> list[Edit]:
         """Edits with these field values; unchanged ones are the same objects as before.

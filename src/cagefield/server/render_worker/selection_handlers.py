@@ -137,15 +137,10 @@ class SelectionHandlers:
 
     def _seed(self, shown: Shown, pick: FloodPick) -> int:
         """Number of the element whose deformed position is nearest to the surface at a pixel."""
-        camera = pick.camera
-        x = min(int(pick.x * camera.width), camera.width - 1)
-        y = min(int(pick.y * camera.height), camera.height - 1)
-        renderer = self._renderers.renderer(shown, Refinement.DRAFT).renderer
-        frame = renderer.render(camera, region=(x, y, 1, 1))
-        if frame.opacity[0, 0] < 0.5:
+        found = self._renderers.surface(shown, pick.camera, pick.x, pick.y)
+        if found is None:
             raise CagefieldError("there is no surface under the mouse; click on the object")
-        origins, directions = camera.rays(np.array([[x, y]]))
-        point = origins[0] + float(frame.depth[0, 0]) * directions[0]
+        point, _ = found
         seen = self._positions(shown, np.arange(len(self._elements)))
         if not len(seen.points):
             raise CagefieldError("the field has nothing to select: all of it is transparent or deleted")

@@ -19,7 +19,6 @@ from cagefield.server.render_worker.encoding import picture_of, png
 from cagefield.server.render_worker.grid_lines import grid_lines
 from cagefield.server.render_worker.job_files import JobFiles
 from cagefield.server.render_worker.page_files import PageFiles
-from cagefield.server.render_worker.refinement import Refinement
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.selection_handlers import SelectionHandlers
 from cagefield.server.render_worker.splat_density import dense_cells
@@ -157,16 +156,10 @@ class TaskHandlers:
 
     def _surface(self, task: SurfaceTask) -> tuple[list[float], list[float]] | None:
         """(point, normal) of the surface at a pixel; None where the picture is half empty."""
-        camera = task.camera
-        x = min(int(task.x * camera.width), camera.width - 1)
-        y = min(int(task.y * camera.height), camera.height - 1)
-        renderer = self._renderers.renderer(task.shown, Refinement.DRAFT).renderer
-        frame = renderer.render(camera, normals=True, region=(x, y, 1, 1))
-        if frame.normals is None or frame.opacity[0, 0] < 0.5:
+        found = self._renderers.surface(task.shown, task.camera, task.x, task.y, normals=True)
+        if found is None or found[1] is None:
             return None
-        origins, directions = camera.rays(np.array([[x, y]]))
-        point = origins[0] + float(frame.depth[0, 0]) * directions[0]
-        return point.tolist(), frame.normals[0, 0].tolist()
+        return found[0].tolist(), found[1].tolist()
 
     def _fit(self, task: FitTask) -> list[bool]:
         """Which of the cage's `probes` are dense."""

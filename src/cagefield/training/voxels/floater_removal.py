@@ -23,7 +23,7 @@ _NEIGHBORHOOD = np.ones((3, 3, 3), bool)
 def remove_floaters(field: VoxelField) -> VoxelField:
     """Field without its floaters: small clouds that are not 26-connected to a larger cloud.
 
-    Every vertex next to a remaining cloud is keep, however thin. On the built-in digger (200x200 photos,
+    Every vertex next to a remaining cloud is kept, however thin. On the built-in digger (200x200 photos,
     1,600 steps) 170 of 172 clouds and 1.8% of the vertices go; test PSNR changes by +0.001 dB.
     """
     occupied = np.zeros(field.resolution, bool)
@@ -36,12 +36,4 @@ def remove_floaters(field: VoxelField) -> VoxelField:
     size[0] = 0
     is_large = size >= min(MAX_FLOATER_VERTICES, MAX_FLOATER_SHARE * size.max())
     near_large = ndimage.binary_dilation(is_large[cloud], _NEIGHBORHOOD)
-    keep = near_large.reshape(-1)[field.vertices]
-    return VoxelField(
-        field.bounds,
-        field.resolution,
-        field.vertices[keep],
-        field.density[keep],
-        field.sh[keep],
-        field.contracted,
-    )
+    return field.take(near_large.reshape(-1)[field.vertices])
