@@ -16,7 +16,8 @@ from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
 from cagefield.compute.device_buffers import DeviceBuffers, empty_array
 from cagefield.compute.devices import floats, ints
-from cagefield.rendering.splats.device_sorting import exclusive_scan, sort_by_key
+from cagefield.rendering.device_image import DeviceSums, SumBuffers
+from cagefield.rendering.splats.device_sorting import passes_of, sort_scratch
 from cagefield.rendering.splats.kernels import device_rasterizer as kernels
 from cagefield.rendering.splats.kernels.blending import T_MIN
 from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE_PX
@@ -42,7 +43,7 @@ class SplatArrays:
         devices.start()
         self.splats = splats
         self.has_normals = normals is not None
-        self.buffers = DeviceBuffers()
+        self.buffers, self.sum_buffers = DeviceBuffers(), SumBuffers()
         self.args = kernels.SplatArgs(
             means=to_device(splats.means),
             covariances=to_device(splats.covariances),
@@ -99,6 +100,14 @@ class DeviceProjection:
         """The picture [H,W,channels]."""
         return untiled(self.blend(channels)[0], self.width, self.height)
 
+    def sums(self, buffers: SumBuffers) -> DeviceSums:
+        """Sums of the image on the device, in memory of `buffers`."""
+        out = buffers.take(self.tiles * DEPTH * AREA)
+        sums = DeviceSums(out, self.width, self.height, DEPTH, TILE_PX)
+        buffers.lend(sums)
+        kernels.blend(self.packed, self.ids, self.starts, self.tiles, self.across, out, float(T_MIN), DEPTH)
+        return sums
+
     def opacity_before(self, pixels: NDArray[Any], distances: NDArray[Any]) -> Float32:
         """Opacity [K] gathered before distances [K] along the rays of pixels [K,2] inside the picture."""
         out = empty_array(len(pixels))
@@ -142,19 +151,39 @@ def project_args(
         terms,
         intrinsics(camera).model,
     )
-    keys, order = buffers.take("keys", count, np.int32), buffers.take("order", count, np.int32)
-    kernels.depth_keys(depths, boxes, keys, order, count)
-    order = sort_by_key(keys, order, count, kernels.HIDDEN_KEY, "splats", buffers)[1]
+    order = buffers.take("order", count, np.int32)
     firsts = buffers.take("firsts", count + 1, np.int32)
-    kernels.count_tiles(order, boxes, packed, firsts, count)
-    exclusive_scan(firsts, count + 1, buffers)
+    kernels.order_splats(
+        depths,
+        boxes,
+        packed,
+        buffers.take("keys", count, np.int32),
+        order,
+        firsts,
+        sort_scratch(count, "splats", buffers, scanned=count + 1),
+        count,
+        passes_of(kernels.HIDDEN_KEY),
+    )
     pairs = int(firsts[count])
     across, down = -(-width // TILE_PX), -(-height // TILE_PX)
     touched, ids = buffers.take("touched", pairs, np.int32), buffers.take("ids", pairs, np.int32)
-    kernels.list_tiles(order, firsts, boxes, packed, across, touched, ids, count)
-    touched, ids = sort_by_key(touched, ids, pairs, across * down - 1, "pairs", buffers)
     starts = buffers.take("starts", across * down + 1, np.int32)
-    kernels.tile_starts(touched, starts, pairs, across * down)
+    scratch, passes = sort_scratch(pairs, "pairs", buffers), passes_of(across * down - 1)
+    kernels.list_pairs(
+        order,
+        firsts,
+        boxes,
+        packed,
+        ints((across, down)),
+        touched,
+        ids,
+        starts,
+        scratch,
+        count,
+        pairs,
+        passes,
+    )
+    ids = scratch.other_values if passes % 2 else ids
     return DeviceProjection(packed, boxes, ids, starts, pairs, width, height)
 
 

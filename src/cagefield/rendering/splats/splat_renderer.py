@@ -139,8 +139,17 @@ class SplatRenderer:
             seen = self.project(camera, near=near, region=region, normals=normals, detail=detail)
             if proceed is not None:
                 proceed()
+            if not normals and self._arrays is not None:
+                return self._device_frame(seen, self._arrays, background)
             picture = seen.picture(NORMALS if normals else DEPTH)
         return _frame(picture, background, normals)
+
+    @staticmethod
+    def _device_frame(seen: Any, arrays: SplatArrays, background: Background) -> RenderResult:
+        """Image of a DeviceProjection, on the device."""
+        from cagefield.rendering.device_image import DeviceRenderResult
+
+        return DeviceRenderResult.of_sums(seen.sums(arrays.sum_buffers), background)
 
     def project(
         self,

@@ -50,6 +50,7 @@ class VoxelRenderer:
     ) -> None:
         """Raises EditError where an edit cannot be evaluated, DeviceError where no device starts."""
         devices.start()
+        from cagefield.rendering.device_image import SumBuffers
         from cagefield.rendering.voxels import occupancy
         from cagefield.rendering.voxels.device_grid import DeviceGrid, occupancy_args, to_device
 
@@ -61,7 +62,7 @@ class VoxelRenderer:
         self.grid = shared.with_layers(self.edits.layers)
         self._canonical = occupancy.of_field(field)
         self._canonical_bricks = occupancy_args(self._canonical, to_device(self._canonical.codes))
-        self._pixels: dict[tuple[int, int], Any] = {}
+        self._sum_buffers = SumBuffers()
         self._directions: dict[int, tuple[NDArray[np.float32], Any]] = {}
         self._coarse = False
         self._fixed_edits: FixedEdits | None = None
@@ -177,8 +178,15 @@ class VoxelRenderer:
                 self._stack.n_edits > 0,
                 self._stack.has_flows,
             )
-        marched = out if isinstance(out, np.ndarray) else out.to_numpy()
-        return _frame(marched.reshape(height, width, 8), background, normals)
+        if isinstance(out, np.ndarray):
+            return _frame(out.reshape(height, width, 8), background, normals)
+        from cagefield.rendering.device_image import DeviceRenderResult, DeviceSums
+
+        sums = DeviceSums(out, width, height, 8)
+        self._sum_buffers.lend(sums)
+        if normals:
+            return _frame(out.to_numpy().reshape(height, width, 8), background, normals)
+        return DeviceRenderResult.of_sums(sums, background)
 
     def _device_directions(self, camera: Camera) -> Any:
         """The camera-space directions of a camera's pixels on the device; those of some sizes are kept."""
@@ -193,13 +201,9 @@ class VoxelRenderer:
 
     def _buffer(self, width: int, height: int) -> Any:
         """Where a march writes to; a numpy array on the CPU."""
-        from cagefield.compute.quadrants import qd
-
         if devices.current() == "cpu":
             return np.empty(width * height * 8, np.float32)
-        if (width, height) not in self._pixels:
-            self._pixels = {(width, height): qd.ndarray(qd.f32, (width * height * 8,))}
-        return self._pixels[(width, height)]
+        return self._sum_buffers.take(width * height * 8)
 
 
 def _jumps(edits: EditMap) -> bool:

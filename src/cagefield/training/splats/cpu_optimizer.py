@@ -54,13 +54,18 @@ class CpuSplatOptimizer:
 
     def compare(self, photo: Photo) -> Float32:
         """See `SplatOptimizer.compare`."""
-        seen, self._photo = self._projected, photo
+        seen = self._projected
+        self._weights = photo.weights
+        if self._weights is None:
+            self._weights = self._buffers.take("weights", (seen.tiles, AREA), np.float32)
+            self._weights.fill(1.0)
+        self._photo = photo
         self._color = self._buffers.take("color", (seen.tiles, 3, AREA), np.float32)
         self._slopes = self._buffers.take("slopes", (seen.tiles, 3, AREA), np.float32)
         sums = np.empty((seen.tiles, 7), np.float32)
         with kernels():
             residuals(
-                self._out, photo.target, seen.width, seen.height, photo.gain, photo.background, photo.weights,
+                self._out, photo.target, seen.width, seen.height, photo.gain, photo.background, self._weights,
                 self._color, self._slopes, sums,
             )  # fmt: skip
         return sums
@@ -76,7 +81,7 @@ class CpuSplatOptimizer:
         with kernels():
             add_ssim_gradient(
                 self._color, photo.target, seen.width, seen.height, photo.gain, photo.background,
-                photo.weights, weight,
+                self._weights, weight,
                 self._buffers.take("moments", (3, MOMENT_PLANES, *size), np.float32),
                 self._buffers.take("moment_slopes", (3, 3, *size), np.float32),
                 self._buffers.take("pixels", (3, 2, *size), np.float32), self._slopes,
@@ -89,7 +94,7 @@ class CpuSplatOptimizer:
         with kernels():
             seen.gradients(
                 self._color, self._slopes, self._stops, sums, free_distances, empty_space_penalty,
-                self._photo.weights,
+                self._weights,
             )  # fmt: skip
             backpropagate(
                 PairArgs(seen.order, seen.firsts, seen.slots, sums),

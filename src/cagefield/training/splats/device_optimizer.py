@@ -1,8 +1,7 @@
 """Steps of splats on a GPU (Quadrants kernels).
 
-Splats stay on the device from step to step. Each step uploads its photo and downloads the sums of its tiles;
-`state` downloads the splats, and the next step uploads them again. Photos are not kept on the device, so that
-its memory holds one photo, the splats, and the pairs (tile, splat) of one image.
+Splats stay on the device from step to step, photos up to a limit. Each step downloads the sums of its photo's
+tiles; `state` downloads the splats, and the next step uploads them again.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ class DeviceSplatOptimizer:
     """
 
     def __init__(self, state: SplatState, near: float, antialiased: bool) -> None:
-        devices.start()
+        self._has_subgroups = devices.start() != "cpu"
         self._near, self._antialiased = near, antialiased
         self._buffers = DeviceBuffers()
         self._arrays: dict[str, Any] = {}
@@ -54,6 +53,7 @@ class DeviceSplatOptimizer:
         self._photo: PhotoArgs
         self._color: Any
         self._slopes: Any
+        self._ones: tuple[int, Any] | None = None
 
     @property
     def state(self) -> SplatState:
@@ -76,12 +76,12 @@ class DeviceSplatOptimizer:
         count, buffers = len(self), self._buffers
         covariances = buffers.take("covariances", 6 * count)
         self._opacities = buffers.take("opacities", count)
-        if kept is None:
-            kept = np.ones(count, bool)
+        mask = buffers.take("unused_mask", 1, np.uint8)
+        if kept is not None:
+            mask = buffers.upload("kept", kept.view(np.uint8))
         device_backward.build_covariances(
-            self._parameters(), buffers.upload("kept", kept.astype(np.uint8)), covariances, self._opacities,
-            count,
-        )  # fmt: skip
+            self._parameters(), mask, int(kept is not None), covariances, self._opacities, count
+        )
         unused = buffers.take("unused", 1)
         splats = raster_kernels.SplatArgs(
             means=self._arrays["means"],
@@ -113,8 +113,10 @@ class DeviceSplatOptimizer:
         """See `SplatOptimizer.compare`."""
         seen, buffers = self._projected, self._buffers
         self._photo = PhotoArgs(
-            target=buffers.upload("target", photo.target),
-            weights=buffers.upload("weights", photo.weights),
+            target=buffers.upload_once("target", photo.target),
+            weights=self._unit_weights()
+            if photo.weights is None
+            else buffers.upload("weights", photo.weights),
             gain=floats(photo.gain),
             background=floats(photo.background),
             width=seen.width,
@@ -123,9 +125,18 @@ class DeviceSplatOptimizer:
         )
         self._color = buffers.take("color", seen.tiles * 3 * AREA)
         self._slopes = buffers.take("slopes", seen.tiles * 3 * AREA)
-        sums = buffers.upload("tile_sums", np.zeros(seen.tiles * device_pixels.TILE_SUMS, np.float32))
-        device_pixels.residuals(self._image, self._photo, self._color, self._slopes, sums, seen.tiles)
+        sums = buffers.exact("tile_sums", seen.tiles * device_pixels.TILE_SUMS)
+        device_pixels.residuals(
+            self._image, self._photo, self._color, self._slopes, sums, seen.tiles, self._has_subgroups
+        )
         return np.asarray(sums.to_numpy()).reshape(seen.tiles, device_pixels.TILE_SUMS)
+
+    def _unit_weights(self) -> Any:
+        """Weights 1 of at least as many pixels as the image has."""
+        size = self._projected.tiles * AREA
+        if self._ones is None or self._ones[0] < size:
+            self._ones = size, self._buffers.upload("ones", np.ones(size, np.float32))
+        return self._ones[1]
 
     def slopes(self) -> Float32:
         """See `SplatOptimizer.slopes`."""
@@ -149,7 +160,6 @@ class DeviceSplatOptimizer:
         """See `SplatOptimizer.backpropagate`."""
         seen, count, buffers = self._projected, len(self), self._buffers
         sums = buffers.take("sums", SUMS * count)
-        sums.fill(0.0)
         device_pixels.gradients(
             seen.packed,
             seen.ids,
@@ -159,10 +169,12 @@ class DeviceSplatOptimizer:
             self._color,
             self._slopes,
             self._photo.weights,
-            buffers.upload("free_distances", free_distances),
+            buffers.upload_once("free_distances", free_distances),
             ints(free_distances.shape[:0:-1]),
             empty_space_penalty,
             sums,
+            count,
+            self._has_subgroups,
         )
         device_backward.backpropagate(
             seen.boxes,

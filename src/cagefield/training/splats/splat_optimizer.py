@@ -17,14 +17,15 @@ class Photo(NamedTuple):
     """Photo, and the conditions under which an image is compared with it.
 
     Attributes:
-        target: [tiles, 3 or 4, AREA] uint8; straight alpha where there are 4 channels.
-        weights: [tiles,AREA] weights of the pixels; 0 for masked ones.
+        target: [tiles, 3 or 4, AREA] uint8; straight alpha where there are 4 channels. Never changed: devices
+            keep it.
+        weights: [tiles,AREA] weights of the pixels; 0 for masked ones. None: 1.
         gain: [3] exposure, by which the image is multiplied.
         background: [3] in [0,1], behind image and photo.
     """
 
     target: NDArray[np.uint8]
-    weights: Float32
+    weights: Float32 | None
     gain: Float32
     background: Float32
 
@@ -56,7 +57,7 @@ class SplatOptimizer(Protocol):
     def backpropagate(self, free_distances: Float32, empty_space_penalty: float) -> None:
         """Compute gradients and curvatures of the visible splats.
 
-        `free_distances` [2,h,w]: see `rasterizer.Projection.gradients`.
+        `free_distances` [2,h,w]: see `rasterizer.Projection.gradients`; never changed.
         """
 
     def pose_sums(self) -> tuple[Array, Array]:

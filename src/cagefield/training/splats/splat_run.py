@@ -70,6 +70,9 @@ CARVING_INTERVAL_STEPS = 120
 MAX_SPLATS_PER_PIXEL = 0.15
 """Maximum number of splats per photo pixel after a run of five minutes."""
 
+GPU_SPEEDUP = 10.0
+"""Minutes of two CPU cores that count as a minute of a GPU (`benchmarks/results/beer_1_cuda.md`)."""
+
 STEPS_PER_MINUTE = 800
 """Steps that count as a minute in a run limited by steps."""
 
@@ -79,7 +82,9 @@ def max_splats(cameras: Sequence[Camera], config: SplatConfig) -> int:
     if config.splats is not None:
         return config.splats
     pixels = float(np.median([camera.width * camera.height for camera in cameras]))
-    minutes = config.minutes or config.steps / STEPS_PER_MINUTE
+    minutes = config.steps / STEPS_PER_MINUTE
+    if config.minutes is not None:
+        minutes = config.minutes * (GPU_SPEEDUP if devices.is_gpu() else 1.0)
     return int(np.clip(MAX_SPLATS_PER_PIXEL * pixels * (minutes / 5.0) ** 0.5, 2000, 1_000_000))
 
 
@@ -185,7 +190,8 @@ class SplatRun:
             self.poses.step(index, *optimizer.pose_sums(), min(rate, 1.0))
         optimizer.update(self._step_args(rate, degree))
         self._update_gain(index, tile_sums)
-        loss = float(tile_sums[:, 0].sum()) / max(3.0 * float(weights.sum()), 1.0)
+        total = len(target) * AREA if weights is None else float(weights.sum())
+        loss = float(tile_sums[:, 0].sum()) / max(3.0 * total, 1.0)
         self.running_loss = loss if not self.running_loss > 0 else 0.98 * self.running_loss + 0.02 * loss
 
     def _step_args(self, rate: float, degree: int) -> StepArgs:
@@ -201,12 +207,15 @@ class SplatRun:
             pull=-config.opacity_reg,
         )
 
-    def _weights(self, index: int, level: int, tiles: int) -> NDArray[np.float32]:
-        """Weights [tiles,AREA] of a photo's pixels, 0 for masked pixels."""
-        weights = self._buffers.take("weights", (tiles, AREA), np.float32)
+    def _weights(self, index: int, level: int, tiles: int) -> NDArray[np.float32] | None:
+        """Weights [tiles,AREA] of a photo's pixels, 0 for masked pixels; None where all are 1."""
         valid = self.views[index].valid_at(level)
+        is_robust = self._robust is not None and level == 0 and self.done >= ROBUST_START_PROGRESS
+        if valid is None and not is_robust:
+            return None
+        weights = self._buffers.take("weights", (tiles, AREA), np.float32)
         weights[:] = 1.0 if valid is None else valid
-        if self._robust is not None and level == 0 and self.done >= ROBUST_START_PROGRESS:
+        if self._robust is not None and is_robust:
             self._robust.scale_weights(index, weights)
         return weights
 

@@ -11,6 +11,7 @@ The oracle is `cagefield.rendering.splats.reference_rasterizer`.
 from dataclasses import dataclass
 
 from cagefield.compute.quadrants import qd
+from cagefield.rendering.splats.kernels.device_sort import SortArgs, scan_blocks, sort_digits
 from cagefield.rendering.splats.kernels.projection import (
     ALPHA_MAX,
     ALPHA_MIN,
@@ -255,50 +256,44 @@ def overlaps(packed: qd.template(), i: qd.i32, column: qd.i32, line: qd.i32):
 
 
 @qd.kernel(fastcache=True)
-def depth_keys(depths: F32, tiles: I32, keys: I32, order: I32, number: qd.i32):
-    """Writes integers in the order of the positive depths, HIDDEN_KEY for hidden splats, and rows."""
+def order_splats(
+    depths: F32,
+    tiles: I32,
+    packed: F32,
+    keys: I32,
+    order: I32,
+    firsts: I32,
+    scratch: SortArgs,
+    number: qd.i32,
+    passes: qd.template(),
+):
+    """Write the splats' `order` by depth, hidden ones last, and where the pairs of each begin.
+
+    `firsts` [number+1] are the counts of tiles before each splat of `order`; `passes` is that of HIDDEN_KEY
+    and even.
+    """
     qd.loop_config(block_dim=128)
     for i in range(number):
         keys[i] = HIDDEN_KEY
         if tiles[4 * i + 1] > tiles[4 * i]:
             keys[i] = qd.bit_cast(depths[i], qd.i32)
         order[i] = i
-
-
-@qd.kernel(fastcache=True)
-def count_tiles(order: I32, tiles: I32, packed: F32, counts: I32, number: qd.i32):
-    """Writes how many tiles each splat of `order` touches, and 0 to counts[number]."""
-    counts[number] = 0
+    sort_digits(keys, order, scratch, number, passes)
     qd.loop_config(block_dim=128)
-    for q in range(number):
-        i = order[q]
+    for q in range(number + 1):
         n = 0
-        for line in range(tiles[4 * i + 2], tiles[4 * i + 3]):
-            for column in range(tiles[4 * i], tiles[4 * i + 1]):
-                n += overlaps(packed, i, column, line)
-        counts[q] = n
+        if q < number:
+            i = order[q]
+            for line in range(tiles[4 * i + 2], tiles[4 * i + 3]):
+                for column in range(tiles[4 * i], tiles[4 * i + 1]):
+                    n += overlaps(packed, i, column, line)
+        firsts[q] = n
+    scan_blocks(firsts, scratch.sums, scratch.tops, number + 1)
 
 
-@qd.kernel(fastcache=True)
-def list_tiles(
-    order: I32, firsts: I32, tiles: I32, packed: F32, across: qd.i32, touched: I32, ids: I32, number: qd.i32
-):
-    """Writes the tiles of splat order[q], and the splat, to touched and ids [firsts[q]:firsts[q+1]]."""
-    qd.loop_config(block_dim=128)
-    for q in range(number):
-        i = order[q]
-        n = firsts[q]
-        for line in range(tiles[4 * i + 2], tiles[4 * i + 3]):
-            for column in range(tiles[4 * i], tiles[4 * i + 1]):
-                if overlaps(packed, i, column, line) == 1:
-                    touched[n] = line * across + column
-                    ids[n] = i
-                    n += 1
-
-
-@qd.kernel(fastcache=True)
-def tile_starts(touched: I32, starts: I32, pairs: qd.i32, tiles: qd.i32):
-    """Writes starts [tiles+1] of the tiles in the sorted `touched` [pairs]."""
+@qd.func
+def write_starts(touched: qd.template(), starts: qd.template(), pairs: qd.i32, tiles: qd.i32):
+    """Write starts [tiles+1] of the tiles in the sorted `touched` [pairs]."""
     qd.loop_config(block_dim=128)
     for e in range(pairs + 1):
         before = -1
@@ -309,6 +304,42 @@ def tile_starts(touched: I32, starts: I32, pairs: qd.i32, tiles: qd.i32):
             here = touched[e]
         for t in range(before + 1, here + 1):
             starts[t] = e
+
+
+@qd.kernel(fastcache=True)
+def list_pairs(
+    order: I32,
+    firsts: I32,
+    tiles: I32,
+    packed: F32,
+    size: ivec2,
+    touched: I32,
+    ids: I32,
+    starts: I32,
+    scratch: SortArgs,
+    number: qd.i32,
+    pairs: qd.i32,
+    passes: qd.template(),
+):
+    """Write the pairs (tile, splat) by tile, and by depth within; `size` is that of the picture in tiles.
+
+    `starts` [tiles+1] are where the tiles begin in `ids`, or in the scratch memory where `passes` is odd.
+    """
+    qd.loop_config(block_dim=128)
+    for q in range(number):
+        i = order[q]
+        n = firsts[q]
+        for line in range(tiles[4 * i + 2], tiles[4 * i + 3]):
+            for column in range(tiles[4 * i], tiles[4 * i + 1]):
+                if overlaps(packed, i, column, line) == 1:
+                    touched[n] = line * size.x + column
+                    ids[n] = i
+                    n += 1
+    sort_digits(touched, ids, scratch, pairs, passes)
+    if qd.static(passes % 2 == 1):
+        write_starts(scratch.other_keys, starts, pairs, size.x * size.y)
+    else:
+        write_starts(touched, starts, pairs, size.x * size.y)
 
 
 @qd.kernel(fastcache=True)

@@ -1,9 +1,11 @@
 """Stable radix sort and exclusive prefix sums on Quadrants' devices.
 
-Least significant digit first, 8 bits a pass. One thread sorts a chunk of CHUNK items: it counts the digits of
-its chunk, an exclusive scan of the counts (digit by digit, chunk by chunk within) gives the position of each
+Least significant digit first, 8 bits a pass. One thread sorts a chunk of items: it counts the digits of its
+chunk, an exclusive scan of the counts (digit by digit, chunk by chunk within) gives the position of each
 chunk's first item of each digit, and the thread moves its items there in their order. No atomics and no
-shared memory: the order depends on nothing but the keys, and every device runs the same code.
+shared memory: the order depends on nothing but the keys, and every device runs the same code. Functions are
+called at the top level of kernels: each of their loops is a launch of its own on the device, and a kernel of
+many loops is one call of the host.
 
 Source: Knuth, "The Art of Computer Programming", volume 3, section 5.2.5; Blelloch, "Prefix sums and their
 applications" (1990).
@@ -11,26 +13,39 @@ applications" (1990).
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
+from dataclasses import dataclass
+
 from cagefield.compute.quadrants import qd
 from cagefield.rendering.voxels.kernels.grid import I32
 
 DIGIT_BITS = 8
 DIGITS = 1 << DIGIT_BITS
 
-CHUNK = 256
-"""Items that one thread sorts."""
-
 SCAN_BLOCK = 128
 """Values that one thread sums in a level of a scan."""
 
 
-@qd.kernel(fastcache=True)
-def exclusive_scan(values: I32, sums: I32, tops: I32, number: qd.i32, blocks: qd.i32, top_blocks: qd.i32):
-    """Replace values [number] by the sums of those before them.
+@dataclass(frozen=True, eq=False)
+class SortArgs:
+    """Scratch memory of sorts and scans, int32.
 
-    `sums` [blocks] and `tops` [top_blocks] are scratch; blocks = ceil(number / SCAN_BLOCK), and `top_blocks`
-    from blocks likewise.
+    counts [DIGITS * ceil(number / chunk)], other_keys and other_values [number]; sums and tops have an item
+    for each SCAN_BLOCK values of a scan, and of sums.
     """
+
+    counts: I32
+    sums: I32
+    tops: I32
+    other_keys: I32
+    other_values: I32
+    chunk: qd.i32
+
+
+@qd.func
+def scan_blocks(values: qd.template(), sums: qd.template(), tops: qd.template(), number: qd.i32):
+    """Replace values [number] by the sums of those before them."""
+    blocks = (number + SCAN_BLOCK - 1) // SCAN_BLOCK
+    top_blocks = (blocks + SCAN_BLOCK - 1) // SCAN_BLOCK
     qd.loop_config(block_dim=64)
     for b in range(blocks):
         total = 0
@@ -65,35 +80,59 @@ def exclusive_scan(values: I32, sums: I32, tops: I32, number: qd.i32, blocks: qd
             total += here
 
 
-@qd.kernel(fastcache=True)
-def count_digits(keys: I32, counts: I32, number: qd.i32, chunks: qd.i32, shift: qd.i32):
-    """Write counts [DIGITS,chunks] of the digit at bit `shift` of keys [number], none of them negative."""
+@qd.func
+def sort_digit(
+    keys: qd.template(),
+    values: qd.template(),
+    sorted_keys: qd.template(),
+    sorted_values: qd.template(),
+    scratch: SortArgs,
+    number: qd.i32,
+    shift: qd.template(),
+):
+    """Write keys and values [number] in stable order of the digit at bit `shift` of the keys."""
+    chunks = (number + scratch.chunk - 1) // scratch.chunk
     qd.loop_config(block_dim=64)
     for c in range(chunks):
         for d in range(DIGITS):
-            counts[d * chunks + c] = 0
-        for i in range(c * CHUNK, qd.min((c + 1) * CHUNK, number)):
+            scratch.counts[d * chunks + c] = 0
+        for i in range(c * scratch.chunk, qd.min((c + 1) * scratch.chunk, number)):
             at = ((keys[i] >> shift) & (DIGITS - 1)) * chunks + c
-            counts[at] = counts[at] + 1
+            scratch.counts[at] = scratch.counts[at] + 1
+    scan_blocks(scratch.counts, scratch.sums, scratch.tops, DIGITS * chunks)
+    qd.loop_config(block_dim=64)
+    for c in range(chunks):
+        for i in range(c * scratch.chunk, qd.min((c + 1) * scratch.chunk, number)):
+            at = ((keys[i] >> shift) & (DIGITS - 1)) * chunks + c
+            to = scratch.counts[at]
+            scratch.counts[at] = to + 1
+            sorted_keys[to] = keys[i]
+            sorted_values[to] = values[i]
+
+
+@qd.func
+def sort_digits(
+    keys: qd.template(), values: qd.template(), scratch: SortArgs, number: qd.i32, passes: qd.template()
+):
+    """Sort by the lowest `passes` digits; for odd `passes` the result is in the other arrays of `scratch`."""
+    for digit in qd.static(range(passes)):
+        if qd.static(digit % 2 == 0):
+            sort_digit(
+                keys, values, scratch.other_keys, scratch.other_values, scratch, number, digit * DIGIT_BITS
+            )
+        else:
+            sort_digit(
+                scratch.other_keys, scratch.other_values, keys, values, scratch, number, digit * DIGIT_BITS
+            )
 
 
 @qd.kernel(fastcache=True)
-def move_items(
-    keys: I32,
-    values: I32,
-    positions: I32,
-    sorted_keys: I32,
-    sorted_values: I32,
-    number: qd.i32,
-    chunks: qd.i32,
-    shift: qd.i32,
-):
-    """Move keys and values to `positions` [DIGITS,chunks], the scanned counts of `count_digits`."""
-    qd.loop_config(block_dim=64)
-    for c in range(chunks):
-        for i in range(c * CHUNK, qd.min((c + 1) * CHUNK, number)):
-            at = ((keys[i] >> shift) & (DIGITS - 1)) * chunks + c
-            to = positions[at]
-            positions[at] = to + 1
-            sorted_keys[to] = keys[i]
-            sorted_values[to] = values[i]
+def exclusive_scan(values: I32, sums: I32, tops: I32, number: qd.i32):
+    """Replace values [number] by the sums of those before them; see `SortArgs`."""
+    scan_blocks(values, sums, tops, number)
+
+
+@qd.kernel(fastcache=True)
+def sort(keys: I32, values: I32, scratch: SortArgs, number: qd.i32, passes: qd.template()):
+    """Sort keys [number], none of them negative, and their values; see `sort_digits`."""
+    sort_digits(keys, values, scratch, number, passes)

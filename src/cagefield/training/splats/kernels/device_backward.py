@@ -52,8 +52,13 @@ def scales(log_scales: qd.template(), i: qd.i32):
 
 
 @qd.kernel(fastcache=True)
-def build_covariances(parameters: ParameterArgs, kept: U8, covariances: F32, opacities: F32, count: qd.i32):
-    """Write covariances [N,6] and opacities [N] of the parameters; opacity 0 where `kept` [N] is 0."""
+def build_covariances(
+    parameters: ParameterArgs, kept: U8, masked: qd.i32, covariances: F32, opacities: F32, count: qd.i32
+):
+    """Write covariances [N,6] and opacities [N] of the parameters.
+
+    Where `masked` is 1, opacities are 0 where `kept` [N] is 0.
+    """
     qd.loop_config(block_dim=128)
     for i in range(count):
         R = rotation(parameters.quaternions, i)
@@ -66,9 +71,10 @@ def build_covariances(parameters: ParameterArgs, kept: U8, covariances: F32, opa
                     total += R[m, j] * R[n, j] * s[j] * s[j]
                 covariances[at] = total
                 at += 1
-        opacities[i] = 0.0
-        if kept[i] != 0:
-            opacities[i] = 1.0 / (1.0 + qd.exp(-parameters.logits[i]))
+        opacities[i] = 1.0 / (1.0 + qd.exp(-parameters.logits[i]))
+        if masked == 1:
+            if kept[i] == 0:
+                opacities[i] = 0.0
 
 
 @qd.func

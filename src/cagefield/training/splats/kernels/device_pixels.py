@@ -1,7 +1,8 @@
 """Residuals of an image's pixels, and their gradients and curvatures by splats, on Quadrants' devices.
 
-One thread has one pixel. Notation and sums as in `rendering.splats.kernels.blending`. Each pixel adds to the
-sums of a splat by atomics, so that the last digits of the sums depend on the order of threads.
+One thread has one pixel. Notation and sums as in `rendering.splats.kernels.blending`. Pixels, or subgroups of
+pixels, add to the sums of a splat by atomics, so that the last digits of the sums depend on the order of
+threads.
 
 The oracle is finite differences of `cagefield.rendering.splats.reference_rasterizer`.
 """
@@ -20,39 +21,66 @@ MIN_PIXEL_TRANSMITTANCE = 1e-4
 TILE_SUMS = 7
 """Sums of a tile: squared error, image x photo (3), image^2 (3); see `gauss_newton_splats.residuals`."""
 
+subgroup = qd.simt.subgroup
 ivec2 = qd.types.vector(2, qd.i32)
 vec4 = qd.types.vector(4, qd.f32)
+vec7 = qd.types.vector(TILE_SUMS, qd.f32)
 vec20 = qd.types.vector(SUMS, qd.f32)
 
 
+@qd.func
+def add_sums(
+    sums: qd.template(), first: qd.i32, values: qd.template(), any_value: qd.i32, grouped: qd.template()
+):
+    """Add a pixel's values to sums[first:]; `any_value` is 0 where they are all 0.
+
+    With `grouped`, the values of a subgroup, which must have one `first`, are summed before.
+    """
+    if qd.static(grouped):
+        if subgroup.any_true(any_value) == 1:
+            lane = subgroup.invocation_id()
+            for j in qd.static(range(values.n)):
+                total = subgroup.reduce_all_add(values[j])
+                if lane == j % qd.static(subgroup.group_size()):
+                    qd.atomic_add(sums[first + j], total)
+    elif any_value == 1:
+        for j in qd.static(range(values.n)):
+            qd.atomic_add(sums[first + j], values[j])
+
+
 @qd.kernel(fastcache=True)
-def residuals(out: F32, photo: PhotoArgs, color: F32, slopes: F32, sums: F32, tiles: qd.i32):
-    """As `gauss_newton_splats.residuals`; `sums` [tiles,TILE_SUMS] are added to."""
+def residuals(
+    out: F32, photo: PhotoArgs, color: F32, slopes: F32, sums: F32, tiles: qd.i32, grouped: qd.template()
+):
+    """As `gauss_newton_splats.residuals`; writes sums [tiles,TILE_SUMS]. `grouped`: see `add_sums`."""
     across = (photo.width + TILE_PX - 1) // TILE_PX
+    for n in range(TILE_SUMS * tiles):
+        sums[n] = 0.0
     qd.loop_config(block_dim=AREA)
     for n in range(tiles * AREA):
         t = n // AREA
         i = n % AREA
         x = (t % across) * TILE_PX + i % TILE_PX
         y = (t // across) * TILE_PX + i // TILE_PX
-        inside = x < photo.width and y < photo.height
+        inside = 0
+        if x < photo.width and y < photo.height:
+            inside = 1
         through = out[4 * t * AREA + i]
         weight = photo.weights[n]
-        error = 0.0
+        values = vec7(0.0)
         for channel in qd.static(range(3)):
             c = out[(4 * t + 1 + channel) * AREA + i] + through * photo.background[channel]
             at = (3 * t + channel) * AREA + i
             color[at] = c
             slopes[at] = 0.0
-            if inside:
+            if inside == 1:
                 value = photo_value(photo, t, channel, i)
                 d = photo.gain[channel] * c - value
                 slopes[at] = photo.gain[channel] * d
-                error += weight * d * d
-                qd.atomic_add(sums[TILE_SUMS * t + 1 + channel], weight * c * value)
-                qd.atomic_add(sums[TILE_SUMS * t + 4 + channel], weight * c * c)
-        if inside:
-            qd.atomic_add(sums[TILE_SUMS * t], error)
+                values[0] += weight * d * d
+                values[1 + channel] = weight * c * value
+                values[4 + channel] = weight * c * c
+        add_sums(sums, TILE_SUMS * t, values, inside, grouped)
 
 
 @qd.func
@@ -84,12 +112,16 @@ def gradients(
     empty_size: ivec2,
     penalty: qd.f32,
     sums: F32,
+    count: qd.i32,
+    grouped: qd.template(),
 ):
-    """Add each splat's pixels to its sums [N,SUMS]; arguments as those of `blending.gradients`.
+    """Write the sums [`count`,SUMS] over each splat's pixels; arguments as those of `blending.gradients`.
 
-    `size` is (width, height) of the image, `empty_size` that of `empty` [2,h,w].
+    `size` is (width, height) of the image, `empty_size` that of `empty` [2,h,w]. `grouped`: see `add_sums`.
     """
     across = (size.x + TILE_PX - 1) // TILE_PX
+    for n in range(SUMS * count):
+        sums[n] = 0.0
     qd.loop_config(block_dim=AREA)
     for n in range(tiles * AREA):
         t = n // AREA
@@ -97,36 +129,43 @@ def gradients(
         column = (t % across) * TILE_PX + i % TILE_PX
         line = (t // across) * TILE_PX + i // TILE_PX
         weight = weights[n]
+        x = qd.cast(column, qd.f32)
+        y = qd.cast(line, qd.f32)
+        at = 3 * t * AREA + i
+        image = vec3(color[at], color[at + AREA], color[at + 2 * AREA])
+        slope = weight * vec3(slopes[at], slopes[at + AREA], slopes[at + 2 * AREA])
+        cell = qd.min(line * empty_size.y // size.y, empty_size.y - 1) * empty_size.x
+        cell += qd.min(column * empty_size.x // size.x, empty_size.x - 1)
+        free_distance = empty[cell]
+        cost = penalty * empty[empty_size.x * empty_size.y + cell]
+        # A pixel without weight is left before its first splat.
+        before = 0.0
         if column < size.x and line < size.y and weight > 0.0:
-            x = qd.cast(column, qd.f32)
-            y = qd.cast(line, qd.f32)
-            at = 3 * t * AREA + i
-            image = vec3(color[at], color[at + AREA], color[at + 2 * AREA])
-            slope = weight * vec3(slopes[at], slopes[at + AREA], slopes[at + 2 * AREA])
-            cell = qd.min(line * empty_size.y // size.y, empty_size.y - 1) * empty_size.x
-            cell += qd.min(column * empty_size.x // size.x, empty_size.x - 1)
-            free_distance = empty[cell]
-            cost = penalty * empty[empty_size.x * empty_size.y + cell]
-            influence = 0.0
-            T = 1.0
-            rest = image
-            e = starts[t]
-            end = starts[t + 1]
-            while e < end and T >= MIN_PIXEL_TRANSMITTANCE:
-                row = PACKED * ids[e]
-                alpha = splat_at(packed, row, x, y)[3]
-                if alpha > 0.0:
-                    own = alpha * T * vec3(packed[row + 6], packed[row + 7], packed[row + 8])
-                    rest -= own
-                    T -= alpha * T
-                    influence += (own - alpha / (1.0 - alpha) * rest).norm()
-                e += 1
-            T = 1.0
-            rest = image
-            e = starts[t]
-            while e < end and T >= MIN_PIXEL_TRANSMITTANCE:
-                splat = ids[e]
-                row = PACKED * splat
+            before = 1.0
+        end = starts[t + 1]
+        influence = 0.0
+        T = before
+        rest = image
+        e = starts[t]
+        while e < end and T >= MIN_PIXEL_TRANSMITTANCE:
+            row = PACKED * ids[e]
+            alpha = splat_at(packed, row, x, y)[3]
+            if alpha > 0.0:
+                own = alpha * T * vec3(packed[row + 6], packed[row + 7], packed[row + 8])
+                rest -= own
+                T -= alpha * T
+                influence += (own - alpha / (1.0 - alpha) * rest).norm()
+            e += 1
+        T = before
+        rest = image
+        e = starts[t]
+        going = 1
+        while e < end and going == 1:
+            splat = ids[e]
+            row = PACKED * splat
+            alpha = 0.0
+            values = vec20(0.0)
+            if T >= MIN_PIXEL_TRANSMITTANCE:
                 here = splat_at(packed, row, x, y)
                 alpha = here[3]
                 if alpha > 0.0:
@@ -174,6 +213,8 @@ def gradients(
                         h * yy * yy,
                         w * slope.dot(slope),
                     )
-                    for j in qd.static(range(SUMS)):
-                        qd.atomic_add(sums[SUMS * splat + j], values[j])
-                e += 1
+            going = qd.cast(T >= MIN_PIXEL_TRANSMITTANCE, qd.i32)
+            if qd.static(grouped):
+                going = subgroup.any_true(going)
+            add_sums(sums, SUMS * splat, values, qd.cast(alpha > 0.0, qd.i32), grouped)
+            e += 1

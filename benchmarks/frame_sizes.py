@@ -1,0 +1,122 @@
+"""Frame times of scenes by picture size, unedited and with three edits, on any compute device.
+
+    python -m benchmarks.frame_sizes SCENE... [--device cuda] [-o benchmarks/results/frame_sizes_cuda.md]
+
+The edits are `benchmarks.captures.frame_times.default_edit`, a continuous move beside it, and a discrete
+move, inpainted and relit. Unedited and edited frames are timed in turn, by the wall, from the call to the
+8-bit picture in main memory; the first frame of a scene is timed alone, with what it compiles or loads.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.captures.frame_times import default_edit
+from benchmarks.common.machine import Machine
+from benchmarks.common.tables import Table, number, write_text
+from benchmarks.common.timing import interleaved
+from cagefield.cameras.camera import Camera
+from cagefield.compute import devices
+from cagefield.edits import Edit, EditStack
+from cagefield.geometry.cage import Cage
+from cagefield.images.image_files import write_png
+from cagefield.scene.scene import Scene
+
+SIZES = ((400, 400), (800, 800), (1920, 1080))
+
+
+def three_edits(scene: Scene, cameras: Sequence[Camera]) -> EditStack:
+    """A turn in the middle of the content, a move beside it, and a discrete move of a third part."""
+    first = default_edit(scene, cameras)
+    box = np.stack([first.inner.corners.min(axis=0), first.inner.corners.max(axis=0)])
+    middle, size = box.mean(axis=0), float((box[1] - box[0]).max())
+    second = Cage.box(middle + np.array([0.0, 0.0, 0.75 * size]), 0.5 * size)
+    third = Cage.box(middle - np.array([0.6 * size, 0.0, 0.3 * size]), 0.5 * size)
+    return EditStack(
+        [
+            first,
+            Edit.continuous(second, second.grown(0.25 * size)).translate((0.1 * size, 0.0, 0.05 * size)),
+            Edit.move(third).translate((0.0, -0.7 * size, 0.3 * size)),
+        ]
+    )
+
+
+def views(scene: Scene, width: int, height: int, count: int = 4) -> list[Camera]:
+    """Evenly chosen test cameras of a scene at a size, as wide as the scene's own."""
+    known = scene.cameras.get("test") or scene.cameras.get("train") or ()
+    chosen = known[:: max(1, len(known) // count)][:count]
+    return [camera.resized(width, height) for camera in chosen]
+
+
+def frames(scene: Scene, cameras: Sequence[Camera]) -> None:
+    """Render each camera's picture."""
+    for camera in cameras:
+        scene.render(camera).rgb8()
+
+
+def rows_of(path: Path, rounds: int, pictures: Path | None) -> list[tuple[str, ...]]:
+    """Rows of one scene."""
+    scene = Scene.open(path)
+    rows = []
+    for width, height in SIZES:
+        cameras = views(scene, width, height)
+        began = time.perf_counter()
+        scene.render(cameras[0]).rgb8()
+        first = time.perf_counter() - began
+        began = time.perf_counter()
+        edited = scene.with_edits(three_edits(scene, cameras))
+        edited.render(cameras[0]).rgb8()
+        first_edited = time.perf_counter() - began
+
+        actions = [partial(frames, which, cameras) for which in (scene, edited)]
+        seconds = interleaved(actions, rounds) / len(cameras)
+        plain, changed = np.median(seconds, axis=0)
+        ratio = float(np.median(seconds[:, 1] / seconds[:, 0]))
+        figures = (number(1e3 * plain, 1), number(1e3 * changed, 1), f"x{ratio:.2f}")
+        rows.append(
+            (path.name, f"{width}x{height}", *figures, number(1e3 * first, 0), number(1e3 * first_edited, 0))
+        )
+        print(rows[-1], flush=True)
+        if pictures is not None:
+            for name, which in (("plain", scene), ("edited", edited)):
+                write_png(pictures / f"{path.name}_{width}_{name}.png", which.render(cameras[0]).rgb8())
+    return rows
+
+
+def main() -> None:
+    """Measures and writes the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("scenes", nargs="+", type=Path)
+    parser.add_argument("--device", default="auto")
+    parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--pictures", type=Path)
+    parser.add_argument("-o", "--out", type=Path)
+    options = parser.parse_args()
+    devices.start(options.device)
+    rows = [row for path in options.scenes for row in rows_of(path, options.rounds, options.pictures)]
+    names = " ".join(path.name for path in options.scenes)
+    table = Table(
+        "Frames by size",
+        ("scene", "picture", "unedited ms", "three edits ms", "ratio", "first ms", "first edited ms"),
+        tuple(rows),
+        (
+            f"Medians of {options.rounds} rounds over 4 cameras; first edited: with edits prepared, inpainted"
+            " and relit.",
+            f"Machine: {Machine.here()}",
+            f"Command: `python -m benchmarks.frame_sizes {names} --device {options.device}`",
+        ),
+        names=2,
+    )
+    table.show()
+    if options.out:
+        write_text(options.out, table.markdown())
+
+
+if __name__ == "__main__":
+    main()
