@@ -2,9 +2,9 @@
 
     python -m benchmarks.frame_sizes SCENE... [--device cuda] [-o benchmarks/results/frame_sizes_cuda.md]
 
-The edits are `benchmarks.captures.frame_times.default_edit`, a continuous move beside it, and a discrete
-move, inpainted and relit. Unedited and edited frames are timed in turn, by the wall, from the call to the
-8-bit picture in main memory; the first frame of a scene is timed alone, with what it compiles or loads.
+The edits are a continuous turn, a continuous move, and a discrete move, inpainted and relit. Unedited and
+edited frames are timed in turn, by the wall, from the call to the 8-bit picture in main memory; the first
+frame of a scene is timed alone, with what it compiles or loads.
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from benchmarks.captures.frame_times import default_edit
 from benchmarks.common.machine import Machine
 from benchmarks.common.tables import Table, number, write_text
 from benchmarks.common.timing import interleaved
 from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
+from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import Cage
 from cagefield.images.image_files import write_png
 from cagefield.scene.scene import Scene
@@ -31,18 +32,36 @@ from cagefield.scene.scene import Scene
 SIZES = ((400, 400), (800, 800), (1920, 1080))
 
 
-def three_edits(scene: Scene, cameras: Sequence[Camera]) -> EditStack:
-    """A turn in the middle of the content, a move beside it, and a discrete move of a third part."""
-    first = default_edit(scene, cameras)
-    box = np.stack([first.inner.corners.min(axis=0), first.inner.corners.max(axis=0)])
-    middle, size = box.mean(axis=0), float((box[1] - box[0]).max())
-    second = Cage.box(middle + np.array([0.0, 0.0, 0.75 * size]), 0.5 * size)
-    third = Cage.box(middle - np.array([0.6 * size, 0.0, 0.3 * size]), 0.5 * size)
+def content(scene: Scene) -> NDArray[np.float64]:
+    """Positions [N,3] of the scene's splats, or of its voxels."""
+    field = scene.field
+    if isinstance(field, SplatField):
+        return field.means.astype(np.float64)
+    grid = np.stack(np.unravel_index(field.vertices, field.resolution), axis=1)
+    lower, upper = field.bounds
+    return lower + grid / (np.array(field.resolution) - 1) * (upper - lower)
+
+
+def three_edits(scene: Scene) -> EditStack:
+    """A turn in the middle of the content, a move of a second part, and a discrete move of a third.
+
+    Cages are .3 of the content's longest side, which leaves out a twentieth at either end; their middles lie
+    at the median and at the quartiles along that side.
+    """
+    points = content(scene)
+    low, high = np.quantile(points, [0.05, 0.95], axis=0)
+    axis, size = int(np.argmax(high - low)), 0.3 * float((high - low).max())
+    middles = [
+        np.median(points[np.abs(points[:, axis] - at) < 0.25 * size], axis=0)
+        for at in np.quantile(points[:, axis], [0.5, 0.2, 0.8])
+    ]
+    first, second, third = (Cage.box(middle, size) for middle in middles)
+    aside = np.roll([0.3 * size, 0.0, 0.0], axis + 1)
     return EditStack(
         [
-            first,
-            Edit.continuous(second, second.grown(0.25 * size)).translate((0.1 * size, 0.0, 0.05 * size)),
-            Edit.move(third).translate((0.0, -0.7 * size, 0.3 * size)),
+            Edit.continuous(first, first.grown(0.3 * size)).rotate(np.roll([0.26, 0.0, 0.0], axis)),
+            Edit.continuous(second, second.grown(0.3 * size)).translate(0.5 * aside),
+            Edit.move(third).translate(aside),
         ]
     )
 
@@ -63,13 +82,13 @@ def frames(scene: Scene, cameras: Sequence[Camera]) -> None:
 def rows_of(path: Path, rounds: int, pictures: Path | None) -> list[tuple[str, ...]]:
     """Rows of one scene."""
     scene = Scene.open(path)
-    edited = scene.with_edits(three_edits(scene, views(scene, *SIZES[0])))
+    edited = scene.with_edits(three_edits(scene))
     firsts = {}
     for which in (scene, edited):
         began = time.perf_counter()
         which.render(views(scene, *SIZES[0])[0]).rgb8()
         firsts[which is edited] = number(1e3 * (time.perf_counter() - began), 0)
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for width, height in SIZES:
         cameras = views(scene, width, height)
         actions = [partial(frames, which, cameras) for which in (scene, edited)]

@@ -71,7 +71,7 @@ MAX_SPLATS_PER_PIXEL = 0.15
 """Maximum number of splats per photo pixel after a run of five minutes."""
 
 GPU_SPEEDUP = 10.0
-"""Minutes of two CPU cores that count as a minute of a GPU (`benchmarks/results/beer_1_cuda.md`)."""
+"""Minutes of two CPU cores that count as a minute of a GPU (`benchmarks/results/splats_cuda.md`)."""
 
 STEPS_PER_MINUTE = 800
 """Steps that count as a minute in a run limited by steps."""

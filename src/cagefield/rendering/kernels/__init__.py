@@ -1,0 +1,1 @@
+"""Quadrants kernels that several renderers use."""
