@@ -22,7 +22,7 @@ from cagefield.rendering.splats.kernels.blending import SUMS
 from cagefield.rendering.splats.kernels.projection import AREA
 from cagefield.rendering.splats.rasterizer import COLOR, intrinsics
 from cagefield.training.splats.kernels import device_backward, device_gauss_newton, device_pixels, device_ssim
-from cagefield.training.splats.kernels.device_args import AverageArgs, ParameterArgs, PhotoArgs
+from cagefield.training.splats.kernels.device_args import AverageArgs, PairArgs, ParameterArgs, PhotoArgs
 from cagefield.training.splats.kernels.device_args import StepArgs as DeviceStepArgs
 from cagefield.training.splats.kernels.gauss_newton_splats import StepArgs
 from cagefield.training.splats.kernels.ssim import MOMENT_PLANES
@@ -161,10 +161,7 @@ class DeviceSplatOptimizer:
         seen, count, buffers = self._projected, len(self), self._buffers
         sums = buffers.take("sums", SUMS * count)
         device_pixels.gradients(
-            seen.packed,
-            seen.ids,
-            seen.starts,
-            seen.tiles,
+            PairArgs(seen.packed, seen.ids, seen.starts, seen.tiles),
             ints((seen.width, seen.height)),
             self._color,
             self._slopes,

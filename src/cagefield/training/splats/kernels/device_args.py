@@ -64,6 +64,16 @@ class PhotoArgs:
     channels: qd.i32
 
 
+@dataclass(frozen=True, eq=False)
+class PairArgs:
+    """Pairs of an image's `tiles` with splats, as `device_rasterizer.DeviceProjection`."""
+
+    packed: F32
+    ids: I32
+    starts: I32
+    tiles: qd.i32
+
+
 @qd.func
 def photo_value(photo: PhotoArgs, tile: qd.i32, channel: qd.i32, pixel: qd.i32):
     """Channel of a photo's pixel over the background, in [0,1]."""

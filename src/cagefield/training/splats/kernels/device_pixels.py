@@ -12,8 +12,8 @@ The oracle is finite differences of `cagefield.rendering.splats.reference_raster
 from cagefield.compute.quadrants import qd
 from cagefield.rendering.splats.kernels.blending import SUMS
 from cagefield.rendering.splats.kernels.projection import ALPHA_MAX, ALPHA_MIN, AREA, PACKED, TILE_PX
-from cagefield.rendering.voxels.kernels.grid import F32, I32, vec3
-from cagefield.training.splats.kernels.device_args import PhotoArgs, photo_value
+from cagefield.rendering.voxels.kernels.grid import F32, vec3
+from cagefield.training.splats.kernels.device_args import PairArgs, PhotoArgs, photo_value
 
 MIN_PIXEL_TRANSMITTANCE = 1e-4
 """Transmittance below which a pixel is left; the CPU leaves a tile once all of its pixels are below 1e-3."""
@@ -100,10 +100,7 @@ def splat_at(packed: qd.template(), row: qd.i32, x: qd.f32, y: qd.f32):
 
 @qd.kernel(fastcache=True)
 def gradients(
-    packed: F32,
-    ids: I32,
-    starts: I32,
-    tiles: qd.i32,
+    pairs: PairArgs,
     size: ivec2,
     color: F32,
     slopes: F32,
@@ -123,7 +120,7 @@ def gradients(
     for n in range(SUMS * count):
         sums[n] = 0.0
     qd.loop_config(block_dim=AREA)
-    for n in range(tiles * AREA):
+    for n in range(pairs.tiles * AREA):
         t = n // AREA
         i = n % AREA
         column = (t % across) * TILE_PX + i % TILE_PX
@@ -142,35 +139,35 @@ def gradients(
         before = 0.0
         if column < size.x and line < size.y and weight > 0.0:
             before = 1.0
-        end = starts[t + 1]
+        end = pairs.starts[t + 1]
         influence = 0.0
         T = before
         rest = image
-        e = starts[t]
+        e = pairs.starts[t]
         while e < end and T >= MIN_PIXEL_TRANSMITTANCE:
-            row = PACKED * ids[e]
-            alpha = splat_at(packed, row, x, y)[3]
+            row = PACKED * pairs.ids[e]
+            alpha = splat_at(pairs.packed, row, x, y)[3]
             if alpha > 0.0:
-                own = alpha * T * vec3(packed[row + 6], packed[row + 7], packed[row + 8])
+                own = alpha * T * vec3(pairs.packed[row + 6], pairs.packed[row + 7], pairs.packed[row + 8])
                 rest -= own
                 T -= alpha * T
                 influence += (own - alpha / (1.0 - alpha) * rest).norm()
             e += 1
         T = before
         rest = image
-        e = starts[t]
+        e = pairs.starts[t]
         going = 1
         while e < end and going == 1:
-            splat = ids[e]
+            splat = pairs.ids[e]
             row = PACKED * splat
             alpha = 0.0
             values = vec20(0.0)
             if T >= MIN_PIXEL_TRANSMITTANCE:
-                here = splat_at(packed, row, x, y)
+                here = splat_at(pairs.packed, row, x, y)
                 alpha = here[3]
                 if alpha > 0.0:
                     w = alpha * T
-                    own = w * vec3(packed[row + 6], packed[row + 7], packed[row + 8])
+                    own = w * vec3(pairs.packed[row + 6], pairs.packed[row + 7], pairs.packed[row + 8])
                     rest -= own
                     T -= w
                     J = own - alpha / (1.0 - alpha) * rest
@@ -181,9 +178,9 @@ def gradients(
                     v = J.dot(slope)
                     h = J.norm() * influence
                     distance = (
-                        packed[row + 10]
-                        + packed[row + 11] * (x - packed[row])
-                        + packed[row + 12] * (y - packed[row + 1])
+                        pairs.packed[row + 10]
+                        + pairs.packed[row + 11] * (x - pairs.packed[row])
+                        + pairs.packed[row + 12] * (y - pairs.packed[row + 1])
                     )
                     fade = v
                     if distance < free_distance:
