@@ -156,7 +156,10 @@ class VoxelRenderer:
         pose = march.CameraArgs(
             directions, camera.width, floats(camera.c2w[:3, :3]), floats(camera.c2w[:3, 3])
         )
-        how = march.MarchArgs(length, near, int(normals), int(self.preserve_opacity))
+        how = march.MarchArgs(length, near, int(self.preserve_opacity))
+        edited = march.UNEDITED if self._stack.n_edits == 0 else march.EDITED
+        if self._stack.has_flows:
+            edited = march.EDITED_BY_FLOWS
         rows = down if proceed is None else BAND
         for row in range(0, down, rows):
             if proceed is not None:
@@ -175,8 +178,8 @@ class VoxelRenderer:
                 self._stack.args,
                 field.sh.shape[1],
                 field.contracted,
-                self._stack.n_edits > 0,
-                self._stack.has_flows,
+                edited,
+                normals,
             )
         if isinstance(out, np.ndarray):
             return _frame(out.reshape(height, width, 8), background, normals)

@@ -69,6 +69,10 @@ class TileArgs:
     rows: qd.i32
 
 
+UNEDITED, EDITED, EDITED_BY_FLOWS = range(3)
+"""Maps that a march evaluates: none, those of edits from lattices or closed forms, flows too."""
+
+
 @dataclass(frozen=True, eq=False)
 class MarchArgs:
     """How rays are marched: step and nearest distance, in units of t, and the values computed for a
@@ -76,7 +80,6 @@ class MarchArgs:
 
     step: qd.f32
     near: qd.f32
-    with_normals: qd.i32
     preserve_opacity: qd.i32
 
 
@@ -108,11 +111,12 @@ def march_tiles(
     K: qd.template(),
     contracted: qd.template(),
     edited: qd.template(),
-    flows: qd.template(),
+    with_normals: qd.template(),
 ):
     """Marches rows of tiles of a rectangle of a camera's picture.
 
-    out: [size.y * size.x, 8]: premultiplied rgb, opacity, sum of w t, and the premultiplied normal.
+    out: [size.y * size.x, 8]: premultiplied rgb, opacity, sum of w t, and the premultiplied normal, 0 without
+    `with_normals`. `edited`: UNEDITED, EDITED, or EDITED_BY_FLOWS where a flow is evaluated exactly.
 
     The part of a ray that may lie in the edits' boxes is found first; only its samples in occupied blocks
     evaluate the edits' maps.
@@ -146,7 +150,7 @@ def march_tiles(
             edit_out = -1e30
             ray = EditedRay(edit=-1)
             turned = basis
-            if qd.static(edited):
+            if qd.static(edited != UNEDITED):
                 world = safe_inverse(d)
                 for k in range(space.edit_boxes.shape[0] // 6):
                     at = 6 * k
@@ -180,16 +184,18 @@ def march_tiles(
                     moved = STAYED
                     place = 0
                     view = d
-                    if qd.static(edited):
+                    if qd.static(edited != UNEDITED):
                         if t >= edit_in and t <= edit_out:
                             p = camera.origin + t * d
-                            canonical, view, place, moved = map_along(ray, t, p, d, edits, flows)
+                            canonical, view, place, moved = map_along(
+                                ray, t, p, d, edits, edited == EDITED_BY_FLOWS
+                            )
                             if moved != STAYED:
                                 g = to_grid(canonical, grid, contracted)
                     # The last bricks reach beyond the grid, and an edit may map samples there.
                     if g.min() < 0.0 or (g - qd.cast(grid.resolution - 1, qd.f32)).max() > 0.0:
                         place = -1
-                    if qd.static(edited):
+                    if qd.static(edited != UNEDITED):
                         if moved != STAYED and place == 0 and not is_occupied(space.canonical_bricks, g):
                             place = -1
                     if place >= 0:
@@ -201,7 +207,7 @@ def march_tiles(
                         b = corner_weights(f)
                         raw = gather_density(grid.density, slots, b)
                         if raw > 0.0:
-                            if qd.static(edited):
+                            if qd.static(edited != UNEDITED):
                                 if march.preserve_opacity == 1 and moved != STAYED:
                                     raw *= view.norm()
                             keep = qd.exp(-raw * h)
@@ -209,7 +215,7 @@ def march_tiles(
                             T *= keep
                             if w > 1e-4:
                                 seen = basis
-                                if qd.static(edited):
+                                if qd.static(edited != UNEDITED):
                                     if moved == STRAIGHT:
                                         seen = turned
                                     elif moved == BENT:
@@ -217,16 +223,18 @@ def march_tiles(
                                 c = gather_rgb(grid.sh, slots, b, seen, K)
                                 rgb += w * qd.max(qd.min(c, 1.0), 0.0)
                                 depth += w * t
-                                if march.with_normals == 1:
+                                if qd.static(with_normals):
                                     slope = density_slope(grid.density, slots, f)
                                     if qd.static(contracted):
                                         at_world = (camera.origin + t * d - grid.lower) * grid.scale
                                         slope = pull_back(slope * grid.half, at_world) * grid.scale
                                     else:
                                         slope = slope * grid.scale
-                                    if qd.static(edited):
+                                    if qd.static(edited != UNEDITED):
                                         if moved != STAYED:
-                                            slope = through_edits(slope, camera.origin + t * d, edits, flows)
+                                            slope = through_edits(
+                                                slope, camera.origin + t * d, edits, edited == EDITED_BY_FLOWS
+                                            )
                                     normal -= w * slope / qd.max(slope.norm(), 1e-12)
                     t += h
             at = 8 * (y * tiles.size.x + x)
