@@ -20,7 +20,7 @@ const KINDS = { Continuous: "continuous", Move: "move", Copy: "copy", Delete: "d
 const SHELLS = { Flow: "flow", Trilinear: "trilinear" };
 const FALLOFFS = { Smooth: "smooth", Linear: "linear" };
 const SHADOWS = { "Contact shadows": "occlusion", "Cast shadows too": "shadow", None: "none" };
-const LATTICES = { Exact: 0, "32³ nodes": 32, "64³ nodes": 64, "128³ nodes": 128, "256³ nodes": 256 };
+const LATTICES = { Exact: 0, "32³": 32, "64³": 64, "128³": 128, "256³": 256 };
 
 export function options(app: App, actions: Actions): HTMLElement {
   const host = h("div", { class: "pane" });
@@ -102,7 +102,7 @@ export function options(app: App, actions: Actions): HTMLElement {
         if (last) change({ width: value });
       }),
     kind
-      .addBinding(model, "lattice", { label: "Lattice", options: LATTICES })
+      .addBinding(model, "lattice", { label: "Map nodes", options: LATTICES })
       .on("change", ({ value }) => change({ lattice: value })),
     kind.addBinding(model, "error", { label: "Its error", readonly: true }),
   ] as const;

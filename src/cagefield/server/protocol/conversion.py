@@ -147,7 +147,7 @@ def edit_state(
         width=flow.width,
         fill="none" if edit.fill == "none" else "surroundings",
         relight="shadow" if isinstance(edit.relight, CastShadow) else edit.relight,
-        lattice=settings.lattice or 0,
+        lattice=(edit.kernel_lattice if isinstance(edit, Continuous) else settings.lattice) or 0,
         lattice_error=error,
         inner=corners(cage_in_scene(edit)),
         deformed=corners(edit.deformed),

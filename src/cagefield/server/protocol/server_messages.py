@@ -80,7 +80,7 @@ class EditState(Message):
     fill: FillName
     relight: RelightName
     lattice: int
-    """Nodes along an axis, 0 where it is exact."""
+    """Nodes along an axis from which pictures take the map, 0 where they evaluate it exactly."""
     lattice_error: tuple[float, float] | None
     """(max, mean) in voxels, once measured."""
     inner: Corners
