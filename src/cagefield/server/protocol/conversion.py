@@ -9,7 +9,7 @@ import numpy as np
 
 from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Keyframe, Timeline
-from cagefield.edits import Edit, Flow, Paste
+from cagefield.edits import Continuous, Edit, Flow, Paste
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import CastShadow
