@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.compute import devices
+from cagefield.compute import device_buffers, devices
 from cagefield.compute.device_buffers import DeviceBuffers
 from cagefield.rendering.splats.device_sorting import exclusive_scan, sort_by_key
 
@@ -47,3 +47,16 @@ def test_memory_is_reused_while_it_is_large_enough(buffers: DeviceBuffers) -> No
     assert buffers.take("memory", 120) is not first
     assert buffers.take("memory", 145) is buffers.take("memory", 150)
     assert buffers.take("memory", 10, np.int32) is not first
+
+
+def test_constant_arrays_are_uploaded_once(buffers: DeviceBuffers, monkeypatch: pytest.MonkeyPatch) -> None:
+    both = np.arange(24, dtype=np.float32).reshape(2, 12)
+    first, second = buffers.upload_once("constant", both[0]), buffers.upload_once("constant", both[1])
+    assert buffers.upload_once("constant", both[0]) is first
+    np.testing.assert_array_equal(first.to_numpy(), both[0])
+    np.testing.assert_array_equal(second.to_numpy(), both[1])
+    np.testing.assert_array_equal(buffers.upload_once("constant", both).to_numpy(), both.reshape(-1))
+    monkeypatch.setattr(device_buffers, "MAX_KEPT_BYTES", 0)
+    more = [buffers.upload_once("constant", both[:, n : n + 6].copy()) for n in range(2)]
+    assert more[0] is more[1]
+    np.testing.assert_array_equal(more[1].to_numpy(), both[:, 1:7].reshape(-1))

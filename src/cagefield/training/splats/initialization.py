@@ -193,8 +193,8 @@ def depth_ranges(cameras: Sequence[Camera], positions: NDArray[Any]) -> list[tup
 
 def closer_mask(camera: Camera, positions: NDArray[Any], depth: float) -> NDArray[np.bool_]:
     """Mask [N] of positions [N,3] within the camera's image at less than a depth."""
-    local = (positions - camera.origin) @ camera.c2w[:3, :3]
-    rows = np.flatnonzero((-local[:, 2] > 0) & (-local[:, 2] < depth))
+    depths = (camera.origin - positions) @ camera.c2w[:3, 2]
+    rows = np.flatnonzero((depths > 0) & (depths < depth))
     pixels, _ = camera.project(positions[rows])
     with np.errstate(invalid="ignore"):
         inside = (pixels >= 0).all(axis=1) & (pixels < (camera.width, camera.height)).all(axis=1)
