@@ -157,6 +157,16 @@ FEWER_PIXELS = CAMERA.resized(26, 21)
 """A smaller view for edited fields, whose plain pictures take seconds."""
 
 
+def test_each_frame_is_that_of_its_own_camera():
+    """Arguments of launches are temporary objects, whose addresses are used again."""
+    renderer = VoxelRenderer(ball(), step=0.5)
+    for angle in np.linspace(0.0, 5.0, 8):
+        eye = (3.0 * np.cos(angle), 3.0 * np.sin(angle), 1.0)
+        camera = Camera.look_at(eye, (0, 0, 0), width=16, height=12, fov_x=0.6)
+        frame = renderer.render(camera, background="white")
+        assert psnr(frame.rgb, sampled(ball(), samples=150, camera=camera).rgb) > 35
+
+
 @cache
 def unedited(contracted: bool):
     return sampled(ball(contracted), samples=200, camera=FEWER_PIXELS)

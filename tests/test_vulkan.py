@@ -1,4 +1,4 @@
-"""Kernels of splats on Vulkan, in a process of its own: a GPU, or Mesa's software device (lavapipe)."""
+"""Kernels on Vulkan, in a process of its own: a GPU, or Mesa's software device (lavapipe)."""
 
 from __future__ import annotations
 
@@ -33,10 +33,23 @@ def vulkan() -> None:
 @pytest.mark.nightly
 @pytest.mark.train
 @pytest.mark.usefixtures("vulkan")
-@pytest.mark.parametrize("name", ["test_splat_training_device.py", "test_device_sorting.py"])
-def test_kernels_of_splats_on_vulkan(name: str) -> None:
-    """Gradients against the oracle, steps against the CPU's, sorting; whole trainings take minutes."""
-    chosen = ("-k", "not trains_as_the_cpu_does")
-    result = on_vulkan("-m", "pytest", str(TESTS / name), "-q", "-x", *chosen, "-p", "no:cacheprovider")
+@pytest.mark.parametrize(
+    ("name", "chosen"),
+    [
+        ("test_splat_training_device.py", "not trains_as_the_cpu_does"),
+        ("test_splat_device.py", ""),
+        ("test_device_sorting.py", ""),
+        ("test_device_image.py", ""),
+        ("test_launches.py", ""),
+        ("test_renderer.py", "fused or edited_matches or own_camera or distorted"),
+    ],
+)
+def test_kernels_on_vulkan(name: str, chosen: str) -> None:
+    """Gradients and pictures against their oracles, steps against the CPU's, sorting, arguments of launches.
+
+    Whole trainings take minutes.
+    """
+    options = ("-q", "-x", "-k", chosen, "-p", "no:cacheprovider")
+    result = on_vulkan("-m", "pytest", str(TESTS / name), *options)
     assert result.returncode == 0, result.stdout[-4000:]
     assert " passed" in result.stdout and "skipped" not in result.stdout
