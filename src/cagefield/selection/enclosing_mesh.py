@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.errors import CagefieldError
+from cagefield.geometry.mesh_cage import MeshCage
 from cagefield.geometry.triangle_mesh import encloses
 from cagefield.selection.mesh_decimation import decimate
 from cagefield.typing import Array
@@ -93,6 +94,12 @@ def cage_mesh(points: Array, margin: float, *, max_faces: int = MAX_FACES) -> Ca
     raise CagefieldError(
         f"no mesh of {max_faces} faces encloses this selection; allow more faces, or select fewer parts"
     )
+
+
+def mesh_cage_around(points: Array, margin: float, max_faces: int = MAX_FACES) -> MeshCage:
+    """The `cage_mesh` around points [N,3] as the inner cage of an edit; raises as that."""
+    mesh = cage_mesh(points, margin, max_faces=max_faces)
+    return MeshCage(mesh.vertices, mesh.faces)
 
 
 def _level_set(p: Array, edge: float, level: float) -> tuple[Array, NDArray[np.int32]]:

@@ -32,8 +32,8 @@ class MeshShell:
     """phi and phi' of a mesh cage together; valid in all of V^o, the identity on its faces.
 
     to_deformed is the flow Phi of a `MeshFlow`, to_canonical its inverse: each step is its own inverse, so
-    that they close to rounding. Each step is proven one to one by a bound of its velocity's slope. Vertices go
-    where they are moved; the space between follows their mean value coordinates as a velocity: coordinates
+    that they close to rounding. Each step is proven one to one by a bound of its velocity's slope. Vertices
+    go where they are moved; the space between follows their mean value coordinates as a velocity: coordinates
     that are negative, inside of a concave mesh, cannot fold it.
 
     Parameters: the canonical and the deformed inner cage, the outer cage with parallel faces, the falloff.
