@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import tyro
@@ -54,7 +54,11 @@ class Select:
     invert: Flag = False
     """Select all others instead."""
     to_cage: Path | None = None
-    """Write an edit file with a continuous edit whose inner cage is a box around the selection."""
+    """Write an edit file with a continuous edit whose inner cage is around the selection."""
+    cage: Literal["box", "mesh"] = "box"
+    """Shape of the cage of --to-cage: the least box, or a closed mesh around the selection."""
+    faces: int = 240
+    """Triangles of a mesh cage, at most."""
     margin: float | None = None
     """Distance from the selection to the cage, world units; left out, the edge of a cell."""
     remove: Flag = False
@@ -119,12 +123,18 @@ class Select:
 
     def _write_cage(self, elements: Elements, seen: DeformedPositions, mask: Mask, path: Path) -> None:
         from cagefield.edits import Edit, EditStack, save_edits
+        from cagefield.geometry.cage import Cage
         from cagefield.selection.bounding_cages import oriented_box, outer_cage_of_box
+        from cagefield.selection.enclosing_mesh import mesh_cage_around
 
         seen = seen.take(mask[seen.element])
         margin = elements.cell_edge if self.margin is None else self.margin
         inner = oriented_box(seen.points, margin=margin, radii=elements.radii[seen.element])
-        edit = Edit.continuous(inner, outer_cage_of_box(inner), name="selection")
+        outer = outer_cage_of_box(inner)
+        if self.cage == "mesh":
+            inner = mesh_cage_around(seen.points, margin, self.faces)
+            outer = outer_cage_of_box(Cage(inner.corners))
+        edit = Edit.continuous(inner, outer, name="selection")
         save_edits(EditStack([edit]), path)
         print(f"cage written to {path}; apply it after the scene's edits with `cagefield edit --append`")
 

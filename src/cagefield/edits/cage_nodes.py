@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,17 +11,25 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.edits.file_nodes import Node
 from cagefield.edits.operations import euler_degrees
-from cagefield.errors import CagefieldError
+from cagefield.errors import CageError, CagefieldError, EditFileError
 from cagefield.geometry.bspline_lattice import INTERPOLATIONS
 from cagefield.geometry.cage import Cage, LatticeCage
 from cagefield.geometry.cage_checks import MOST_POINTS
 from cagefield.geometry.control_points import ControlPoints
+from cagefield.geometry.mesh_cage import MeshCage
+from cagefield.geometry.mesh_files import read_mesh_cage
 from cagefield.geometry.point_deformers import FALLOFF_CURVES
+from cagefield.geometry.triangle_mesh import MAX_MESH_VERTICES
 from cagefield.typing import Array
 
 
-def parse_inner(node: Node) -> Cage:
-    """The inner cage of an edit: control points, a lattice, or a cage with 8 corners."""
+def parse_inner(node: Node, folder: Path | None = None) -> Cage:
+    """The inner cage of an edit: a mesh, control points, a lattice, or a cage with 8 corners.
+
+    Files of meshes are relative to `folder`; None reads none.
+    """
+    if "mesh" in node.names():
+        return _mesh(node, folder)
     if "lattice" in node.names():
         return _lattice(node)
     return _control_points(node) if "points" in node.names() else parse_cage(node)
@@ -39,6 +48,34 @@ def _lattice(node: Node) -> LatticeCage:
         return LatticeCage(np.array(points), shape, interpolation, pivot=box.pivot)
     except CagefieldError as error:
         raise lattice.error(str(error)) from None
+
+
+def _mesh(node: Node, folder: Path | None) -> MeshCage:
+    keys = node.mapping(required=("mesh",), optional=("pivot", "linear"))
+    mesh = keys["mesh"].mapping(optional=("file", "vertices", "triangles"))
+    if ("file" in mesh) == ("vertices" in mesh) or ("vertices" in mesh) != ("triangles" in mesh):
+        raise keys["mesh"].error("a mesh has either file, or vertices and triangles")
+    pivot = keys["pivot"].vector() if "pivot" in keys else None
+    linear = [row.vector() for row in keys["linear"].items(3)] if "linear" in keys else None
+    try:
+        if "file" in mesh:
+            name = mesh["file"].text()
+            if folder is None:
+                raise CageError("a mesh file is read from an edit file only; give its vertices and triangles")
+            read = read_mesh_cage(folder / name)
+            vertices: Any = read.vertices
+            triangles: Any = read.triangles
+        else:
+            vertices = [vertex.vector() for vertex in mesh["vertices"].items()]
+            triangles = [
+                [number.integer(0, MAX_MESH_VERTICES - 1) for number in triangle.items(3)]
+                for triangle in mesh["triangles"].items()
+            ]
+        return MeshCage(vertices, triangles, pivot=pivot, linear=linear)
+    except EditFileError:
+        raise
+    except CagefieldError as error:
+        raise keys["mesh"].error(str(error)) from None
 
 
 def _control_points(node: Node) -> ControlPoints:
@@ -88,6 +125,8 @@ def dump_inner(cage: Cage) -> dict[str, Any]:
     """The mapping that `parse_inner` reads."""
     if isinstance(cage, LatticeCage):
         return _from_lattice(cage)
+    if isinstance(cage, MeshCage):
+        return _from_mesh(cage)
     return _from_control_points(cage) if isinstance(cage, ControlPoints) else dump_cage(cage)
 
 
@@ -97,6 +136,17 @@ def _from_lattice(cage: LatticeCage) -> dict[str, Any]:
     if box.subdivided([count - 1 for count in cage.shape], cage.interpolation) != cage:
         lattice["control_points"] = cage.control_points.tolist()
     return dump_cage(box) | {"lattice": lattice}
+
+
+def _from_mesh(cage: MeshCage) -> dict[str, Any]:
+    content: dict[str, Any] = {
+        "mesh": {"vertices": cage.vertices.tolist(), "triangles": cage.triangles.tolist()}
+    }
+    if not np.array_equal(cage.vertices.mean(axis=0), cage.pivot):
+        content["pivot"] = cage.pivot.tolist()
+    if not np.array_equal(cage.linear, np.eye(3)):
+        content["linear"] = cage.linear.tolist()
+    return content
 
 
 def _from_control_points(cage: ControlPoints) -> dict[str, Any]:

@@ -46,6 +46,7 @@ from cagefield.warps import (
     FlowShell,
     FreeFormFlow,
     LatticeShell,
+    MeshShell,
     Shell,
     Warp,
     inner_map_between,
@@ -428,7 +429,7 @@ class Continuous(Edit):
         exact = self.exact_warp
         if self.lattice is None:
             return exact
-        if isinstance(exact.shell, FlowShell | FreeFormFlow | LatticeShell):
+        if isinstance(exact.shell, FlowShell | FreeFormFlow | LatticeShell | MeshShell):
             with suppress(DeviceError):
                 return replace(exact, lattice=self._kernel_lattice)
         lattice = Lattice.sample(lambda p: exact.to_canonical(p).points, exact.outer, self.lattice)

@@ -42,6 +42,11 @@
           - twist: {axis: z, degrees: 30}
           - taper: {axis: z, factor: 0.8}
           - move_points: {points: [16, 17], by: [0, 0.1, 0], radius: 0.4, falloff: smooth}
+      - name: statue
+        inner: {mesh: {file: statue.obj}}     # or .ply, .glb; or {vertices: [...], triangles: [...]}
+        outer: {margin: 0.5}
+        operations:
+          - move_point: {point: 12, by: [0, 0, 0.2]}    # a vertex
 
 Further keys of an edit: keep_source (discrete: copy instead of move), enabled, allow_folding. Lengths are
 world units, angles degrees. `parse_edits(dump_edits(stack))` is the stack, bit for bit.
@@ -100,33 +105,41 @@ def load_edits(path: str | os.PathLike[str], *, check: bool = True, mend: bool =
         raise EditFileError(f"{file}: not a UTF-8 text file; save it as UTF-8") from None
     except OSError as error:
         raise EditFileError(f"{file}: cannot be read ({error.strerror or error})") from None
-    return parse_edits(text, format=kind, source=str(file), check=check, mend=mend)
+    folder = file.absolute().parent
+    return parse_edits(text, format=kind, source=str(file), check=check, mend=mend, folder=folder)
 
 
 def parse_edits(
-    text: str, *, format: str = "yaml", source: str = "edits", check: bool = True, mend: bool = False
+    text: str,
+    *,
+    format: str = "yaml",
+    source: str = "edits",
+    check: bool = True,
+    mend: bool = False,
+    folder: Path | None = None,
 ) -> EditStack:
     """The edit stack of a text, format "yaml" or "json"; `source` names it in errors.
 
-    Enabled edits are checked (`Edit.check`) unless check=False; `mend` as for `load_edits`.
+    Enabled edits are checked (`Edit.check`) unless check=False; `mend` as for `load_edits`. Mesh files that
+    the text names are relative to `folder`; without one, none is read.
     """
     yaml = format == "yaml"
     root = file_nodes.read_yaml(text, source, halves=mend) if yaml else file_nodes.read_json(text, source)
     if root.is_list:
-        return _stack(root, check, mend)
+        return _stack(root, check, mend, folder)
     keys = root.mapping(required=("edits",), optional=("version",))
     if "version" in keys and keys["version"].integer(1, 10**6) > VERSION:
         raise keys["version"].error(
             f"version {keys['version'].value} is newer than this program's {VERSION}; update cagefield"
         )
-    return _stack(keys["edits"], check, mend)
+    return _stack(keys["edits"], check, mend, folder)
 
 
-def _stack(node: Node, check: bool, mend: bool) -> EditStack:
+def _stack(node: Node, check: bool, mend: bool, folder: Path | None) -> EditStack:
     items = node.items()
     if len(items) > MAX_EDITS:
         raise node.error(f"{len(items)} edits are too many, a file has at most {MAX_EDITS}; leave some out")
-    edits = [_edit(item, check, mend) for item in items]
+    edits = [_edit(item, check, mend, folder) for item in items]
     shown = (edit.kernel_lattice for edit in edits if edit.enabled and isinstance(edit, Continuous))
     if (problem := problem_of_lattices(shown)) is not None:
         if not mend:
@@ -164,7 +177,7 @@ def dump_edits(stack: EditStack, *, format: str = "yaml") -> str:
     return file_nodes.write_yaml(content)
 
 
-def _edit(node: Node, check: bool, mend: bool) -> Edit:
+def _edit(node: Node, check: bool, mend: bool, folder: Path | None) -> Edit:
     keys = node.mapping(
         required=("inner",),
         optional=(
@@ -186,7 +199,7 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
             "source",
         ),
     )
-    inner = parse_inner(keys["inner"])
+    inner = parse_inner(keys["inner"], folder)
     outer = None if "outer" not in keys or keys["outer"].is_null else parse_outer(keys["outer"], inner)
     options: dict[str, Any] = {}
     if "fill" in keys:

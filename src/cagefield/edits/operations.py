@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from cagefield.errors import CageError
 from cagefield.geometry.cage import FACES, Axes, Cage, LatticeCage
 from cagefield.geometry.cage_checks import factors, vector
+from cagefield.geometry.mesh_cage import MeshCage
 
 Triple: TypeAlias = tuple[float, float, float]
 
@@ -348,9 +349,9 @@ class Taper:
         return f"along {self.axis} by {self.factor:.4g}"
 
 
-def _lattice(cage: Cage, name: str) -> LatticeCage:
-    """The cage as a lattice; a `CageError` with the cure for others."""
-    if isinstance(cage, LatticeCage):
+def _lattice(cage: Cage, name: str) -> LatticeCage | MeshCage:
+    """The cage as a lattice or a mesh; a `CageError` with the cure for others."""
+    if isinstance(cage, LatticeCage | MeshCage):
         return cage
     raise CageError(
         f"a {name} needs a lattice of control points, and this cage has none; give it cells along the axis:"

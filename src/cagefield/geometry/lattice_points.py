@@ -133,33 +133,34 @@ class LatticePoints(ABC, Generic[Lattice]):
         across = point_deformers.axis_number(towards, "towards") if towards else (along + 1) % 3
         if across == along:
             raise CageError(f"a bend along {axis} goes towards another axis than {axis}")
-        turn, points, Q = _finite(angle, "bend angle"), self.control_points, self._turn
-        states = [point_deformers.bend(points, Q, along, across, t * turn, fixed) for t in _shares(turn)]
+        turn, points, Q = finite(angle, "bend angle"), self.control_points, self._turn
+        states = [point_deformers.bend(points, Q, along, across, t * turn, fixed) for t in shares(turn)]
         return self._moved(states[-1], self.pivot, way=tuple(states[:-1]))
 
     def twist(self, axis: str, angle: float, *, fixed: str = "start") -> Lattice:
         """The lattice twisted about an axis of its own by `angle` radians from end to end; see `bend`."""
-        along, turn = point_deformers.axis_number(axis, "axis"), _finite(angle, "twist angle")
+        along, turn = point_deformers.axis_number(axis, "axis"), finite(angle, "twist angle")
         points, Q = self.control_points, self._turn
-        states = [point_deformers.twist(points, Q, along, t * turn, fixed) for t in _shares(turn)]
+        states = [point_deformers.twist(points, Q, along, t * turn, fixed) for t in shares(turn)]
         return self._moved(states[-1], self.pivot, way=tuple(states[:-1]))
 
     def taper(self, axis: str, factor: float, *, fixed: str = "start") -> Lattice:
         """The lattice scaled across an axis of its own, evenly to a factor > 0 at its end; see `bend`."""
-        along, by = point_deformers.axis_number(axis, "axis"), _finite(factor, "taper factor")
+        along, by = point_deformers.axis_number(axis, "axis"), finite(factor, "taper factor")
         if by <= 0.0:
             raise CageError(f"taper factor must be positive, got {by:g}")
         points = point_deformers.taper(self.control_points, self._turn, along, by, fixed)
         return self._moved(points, self.pivot)
 
 
-def _shares(angle: float) -> list[float]:
+def shares(angle: float) -> list[float]:
     """Shares of an angle, up to the whole, that are no more than `STATE_ANGLE` apart; at most 64."""
     count = int(np.clip(np.ceil(abs(angle) / STATE_ANGLE), 1, 64))
     return [(n + 1) / count for n in range(count)]
 
 
-def _finite(value: float, name: str) -> float:
+def finite(value: float, name: str) -> float:
+    """A finite number, or a `CageError` that names it."""
     if not np.isfinite(value):
         raise CageError(f"{name} must be finite, got {value!r}")
     return float(value)

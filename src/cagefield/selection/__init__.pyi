@@ -6,6 +6,7 @@ from .element_selection import Selection as Selection
 from .elements import Elements as Elements
 from .enclosing_mesh import CageMesh as CageMesh
 from .enclosing_mesh import cage_mesh as cage_mesh
+from .enclosing_mesh import mesh_cage_around as mesh_cage_around
 from .field_elements import elements_of_field as elements_of_field
 from .field_elements import without_elements as without_elements
 from .floater_preset import floaters as floaters

@@ -7,7 +7,7 @@ that encloses every position. Decimation may cut convex corners, so the result i
 with a larger level where a position is outside.
 
 Source: Lewiner et al., "Efficient Implementation of Marching Cubes' Cases with Topological Guarantees"
-(2003), implemented by scikit-image; van Oosterom and Strackee, "The Solid Angle of a Plane Triangle" (1983).
+(2003), implemented by scikit-image.
 """
 
 from __future__ import annotations
@@ -19,8 +19,10 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.errors import CagefieldError
+from cagefield.geometry.mesh_cage import MeshCage
+from cagefield.geometry.triangle_mesh import encloses
 from cagefield.selection.mesh_decimation import decimate
-from cagefield.typing import Array, Mask
+from cagefield.typing import Array
 
 MAX_FACES = 500
 """Default number of faces, at most."""
@@ -86,12 +88,18 @@ def cage_mesh(points: Array, margin: float, *, max_faces: int = MAX_FACES) -> Ca
                 f"{max_faces} faces are too few for a closed mesh around this selection; allow {len(faces)} "
                 "or more, or select fewer separate parts"
             )
-        if _encloses(vertices, faces, tested).all():
+        if encloses(vertices, faces, tested).all():
             return CageMesh(vertices, faces, level)
         level *= LEVEL_STEP
     raise CagefieldError(
         f"no mesh of {max_faces} faces encloses this selection; allow more faces, or select fewer parts"
     )
+
+
+def mesh_cage_around(points: Array, margin: float, max_faces: int = MAX_FACES) -> MeshCage:
+    """The `cage_mesh` around points [N,3] as the inner cage of an edit; raises as that."""
+    mesh = cage_mesh(points, margin, max_faces=max_faces)
+    return MeshCage(mesh.vertices, mesh.faces)
 
 
 def _level_set(p: Array, edge: float, level: float) -> tuple[Array, NDArray[np.int32]]:
@@ -122,17 +130,3 @@ def _level_set(p: Array, edge: float, level: float) -> tuple[Array, NDArray[np.i
     outward = float(np.einsum("ni,ni->", a, np.cross(b, c))) > 0.0
     oriented = np.ascontiguousarray(faces if outward else faces[:, ::-1], np.int32)
     return vertices + low + (0.5 - border) * edge, oriented
-
-
-def _encloses(vertices: Array, faces: NDArray[np.int32], points: Array) -> Mask:
-    """[N], True for points with a winding number of the mesh above one half."""
-    inside = np.empty(len(points), bool)
-    for first in range(0, len(points), 256):
-        rows = points[first : first + 256]
-        a, b, c = (vertices[faces[:, n]][None] - rows[:, None] for n in range(3))
-        la, lb, lc = (np.linalg.norm(v, axis=2) for v in (a, b, c))
-        numerator = np.einsum("pfi,pfi->pf", a, np.cross(b, c))
-        denominator = la * lb * lc + (a * b).sum(2) * lc + (b * c).sum(2) * la + (c * a).sum(2) * lb
-        winding = np.arctan2(numerator, denominator).sum(axis=1) / (2.0 * np.pi)
-        inside[first : first + 256] = winding > 0.5
-    return inside

@@ -18,6 +18,7 @@ from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.free_form import FreeFormFlow, Velocity
 from cagefield.warps.interfaces import InnerMap, Mapped, NoInnerMap, Shell, Warp
 from cagefield.warps.lattice_shell import LatticeShell
+from cagefield.warps.mesh_shell import MeshShell
 from cagefield.warps.trilinear_shell import TrilinearShell
 
 __all__ = [
@@ -29,6 +30,7 @@ __all__ = [
     "InnerMap",
     "LatticeShell",
     "Mapped",
+    "MeshShell",
     "NoInnerMap",
     "Shell",
     "TrilinearShell",

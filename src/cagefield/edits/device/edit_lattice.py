@@ -12,7 +12,7 @@ from cagefield.edits.device.kernels.edit_lattice import sample_lattice
 from cagefield.edits.device.packing import pack_warp
 from cagefield.errors import EditError
 from cagefield.files import memory
-from cagefield.warps import FreeFormFlow, LatticeShell, flow_lattice
+from cagefield.warps import FreeFormFlow, LatticeShell, MeshShell, flow_lattice
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.lattice import Lattice
@@ -50,7 +50,7 @@ def sample_nodes(warp: ContinuousWarp, resolution: int) -> NDArray[np.float32]:
     if isinstance(warp.shell, FlowShell):
         strain = LATTICE_STRAIN * min(1.0, (32.0 / resolution) ** 0.5)
         return flow_lattice.sample(warp.shell.with_strain(strain), resolution)
-    if isinstance(warp.shell, LatticeShell):
+    if isinstance(warp.shell, LatticeShell | MeshShell):
         return warp.shell.sample(resolution)
     if isinstance(warp.shell, FreeFormFlow):
         return warp.shell.with_strain(FREE_FORM_STRAIN).sample(resolution, warp.inner)

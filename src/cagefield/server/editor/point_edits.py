@@ -11,6 +11,7 @@ from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage, LatticeCage
 from cagefield.geometry.cage_checks import point_numbers
 from cagefield.geometry.control_points import ControlPoints
+from cagefield.geometry.mesh_cage import MeshCage
 
 OF_CORNERS = (ops.MoveCorner, ops.MoveEdge, ops.MoveFace, ops.MoveCorners)
 """Operations that a cage without corners does not have."""
@@ -23,12 +24,12 @@ def check_operation(cage: Cage, operation: Operation) -> None:
     elif isinstance(operation, ops.MovePoints):
         point_numbers(operation.points, len(cage.handles))
     elif isinstance(operation, ops.Bend | ops.Twist | ops.Taper):
-        if not isinstance(cage, LatticeCage):
+        if not isinstance(cage, LatticeCage | MeshCage):
             raise EditError(f"a {operation.noun} needs a lattice; subdivide the cage first (panel, Cages)")
         if isinstance(operation, ops.Bend) and operation.towards == operation.axis:
             raise EditError(f"a bend along {operation.axis} goes towards another axis; choose one")
-    elif isinstance(cage, ControlPoints) and isinstance(operation, OF_CORNERS):
-        raise EditError("control points have no corners, edges or faces; move the points")
+    elif isinstance(cage, ControlPoints | MeshCage) and isinstance(operation, OF_CORNERS):
+        raise EditError(f"{cage.plural_noun} have no corners, edges or faces; move the points")
 
 
 def subdivided(edit: Edit, cells: tuple[int, int, int], interpolation: str) -> Edit:
@@ -40,6 +41,8 @@ def subdivided(edit: Edit, cells: tuple[int, int, int], interpolation: str) -> E
         raise edit.error("only a continuous edit has a lattice; choose that kind first (D)")
     if isinstance(edit.inner, ControlPoints):
         raise edit.error("control points have no cells; make a new pair of cages to subdivide")
+    if isinstance(edit.inner, MeshCage):
+        raise edit.error("a mesh cage has no cells; make a new pair of cages to subdivide")
     if any(isinstance(operation, ops.MovePoint | ops.MovePoints) for operation in edit.operations):
         raise edit.error("its points were moved, and would be others; reset its operations first")
     settings = edit.shell_settings

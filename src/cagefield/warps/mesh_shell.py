@@ -1,0 +1,143 @@
+"""The map of a mesh cage in an outer cage: the flow that follows its vertices, inside and around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from cagefield.geometry.cage import Cage
+from cagefield.geometry.mesh_cage import MeshCage
+from cagefield.typing import Array, Float32
+from cagefield.warps.cage_maps import flow_between, inner_map_between
+from cagefield.warps.falloff import Falloff
+from cagefield.warps.interfaces import InnerMap, NoInnerMap
+from cagefield.warps.mesh_flow import MeshFlow, MeshPiece, MeshTopology, pieces_of_mesh
+
+MIN_GAP = 0.02
+"""Least gap between the mesh and the outer cage on the way, as a share of the outer cage's half-width."""
+
+MIN_CELLS, MAX_CELLS = 20, 40
+"""Cells of the velocity's grid along each axis of the outer cage."""
+
+CELLS_PER_GAP = 2.5
+"""Cells, at least, between the mesh and the outer cage."""
+
+_WAY_TIMES: Array = np.linspace(0.0, 1.0, 9)
+
+
+@dataclass(frozen=True)
+class MeshShell:
+    """phi and phi' of a mesh cage together; valid in all of V^o, the identity on its faces.
+
+    to_deformed is the flow Phi of a `MeshFlow`, to_canonical its inverse: each step is its own inverse, so
+    that they close to rounding. Each step is proven one to one by a bound of its velocity's slope. Vertices
+    go where they are moved; the space between follows their mean value coordinates as a velocity: coordinates
+    that are negative, inside of a concave mesh, cannot fold it.
+
+    Parameters: the canonical and the deformed inner cage, the outer cage with parallel faces, the falloff.
+    """
+
+    inner: MeshCage
+    deformed: MeshCage
+    outer: Cage
+    falloff: Falloff
+
+    @cached_property
+    def flow(self) -> MeshFlow:
+        """The flow, on a grid that the gap between the cages asks for."""
+        wanted = 2.0 * CELLS_PER_GAP / max(self._gap, 1e-6)
+        cells = int(np.clip(np.ceil(wanted), MIN_CELLS, MAX_CELLS))
+        topology = _topology(self.inner.triangles.tobytes())
+        return MeshFlow(topology, self._pieces, self.outer, self.falloff, cells)
+
+    @cached_property
+    def _pieces(self) -> tuple[MeshPiece, ...]:
+        return pieces_of_mesh(self.inner, self.deformed)
+
+    @cached_property
+    def _gap(self) -> float:
+        """Least 1 - |z| of the vertices on their way, negative outside of the outer cage."""
+        confines = self._confines
+        ways = [self.inner.vertices, *(x for piece in self._pieces for x in piece.at(_WAY_TIMES)[0])]
+        return float(1.0 - max(np.abs((x - confines[0]) @ confines[1].T).max() for x in ways))
+
+    @cached_property
+    def _confines(self) -> tuple[Array, Array, Array]:
+        """(center [3], dz/dx [3,3], dx/dz [3,3]) of the outer cage."""
+        A, b = self.outer.affine
+        return np.asarray(b + 0.5 * A.sum(axis=1)), np.asarray(2.0 * np.linalg.inv(A)), 0.5 * A
+
+    def to_deformed(self, points: Array) -> tuple[Array, Array]:
+        """(deformed points [N,3], Jacobians [N,3,3]) of canonical points [N,3] in V^o."""
+        return self._flowed(points, backwards=False)
+
+    def to_canonical(self, points: Array) -> tuple[Array, Array]:
+        """(canonical points [N,3], Jacobians [N,3,3]) of deformed points [N,3] in V^o."""
+        return self._flowed(points, backwards=True)
+
+    def _flowed(self, points: Array, *, backwards: bool) -> tuple[Array, Array]:
+        if not self._pieces:
+            return points.copy(), np.tile(np.eye(3), (len(points), 1, 1))
+        center, inverse, frame = self._confines
+        z = ((points - center) @ inverse.T).clip(-1.0, 1.0)
+        moved, J = self.flow.through(z, backwards=backwards)
+        return points + (moved - z) @ frame.T, frame @ J @ inverse
+
+    def sample(self, resolution: int) -> Float32:
+        """Displacements to canonical space [R^3,3], x fastest, of the nodes of a `Lattice`; in float32."""
+        from cagefield.warps.kernels.lattice_nodes import sample_flow_nodes
+
+        out = np.zeros((resolution**3, 3), dtype=np.float32)
+        if not self._pieces:
+            return out
+        flow = self.flow
+        padded = np.zeros((*flow.velocities.shape[:-1], 4), dtype=np.float32)
+        padded[..., :3] = flow.velocities
+        center, inverse, frame = self._confines
+        origin, edges = self.outer.frame
+        frames = np.concatenate([center[None], inverse, frame, origin[None], edges])
+        nodes = np.uintp(flow.cells + 1)
+        sample_flow_nodes(padded.reshape(-1), nodes, flow.steps, frames, resolution, out)
+        grid, ends = out.reshape(*3 * (resolution,), 3), [0, -1]
+        grid[ends] = grid[:, ends] = grid[:, :, ends] = 0.0  # the outer faces, which the kernel rounds
+        return out
+
+    def least_ratio(self) -> float:
+        """Least det of d(deformed)/d(canonical) at 4096 points of the outer cage: a sample, not a bound."""
+        origin, frame = self.outer.frame
+        points = origin + np.random.default_rng(0).random((4096, 3)) @ frame.T
+        return float(np.linalg.det(self.to_deformed(points)[1]).min())
+
+    def problem(self) -> str | None:
+        """Why there is no such flow, in words that continue "the flow shell ...", or None."""
+        if not np.array_equal(self.inner.triangles, self.deformed.triangles):
+            return "needs the triangles of the inner cage to stay; move the mesh's vertices only"
+        if not self.outer.is_affine:
+            return "surrounds a mesh cage in an outer cage with parallel faces only; give it a box"
+        if any(np.linalg.det(piece.affine) <= 1e-9 for piece in self._pieces):
+            return "finds no way for the mesh, which is flattened or turned inside out as a whole"
+        if self._gap < MIN_GAP:
+            return (
+                f"has no room: the gap between the mesh and the outer cage on its way is {self._gap:.2g} of"
+                f" the outer cage's half-width and must be at least {MIN_GAP:g} on every side"
+            )
+        if self._pieces and not self.flow.is_one_to_one:
+            return "is strained too much: the mesh moves too far for its gap to the outer cage"
+        return None
+
+
+@lru_cache(maxsize=8)
+def _topology(triangles: bytes) -> MeshTopology:
+    return MeshTopology.from_triangles(np.frombuffer(triangles, dtype=np.int64).reshape(-1, 3))
+
+
+@flow_between.register
+def _(inner: MeshCage, deformed: MeshCage, outer: Cage, falloff: Falloff) -> MeshShell:
+    return MeshShell(inner, deformed, outer, falloff)
+
+
+@inner_map_between.register
+def _(inner: MeshCage, deformed: Cage) -> InnerMap:
+    return NoInnerMap()  # the flow holds the map inside, too
