@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -218,7 +220,9 @@ def test_lit_anew_unless_the_light_is_carried_along() -> None:
 def test_a_deformed_part_is_moved_and_darkened_anew() -> None:
     bent = ProceduralScene("test", (ROD,)).deform("rod", BEND)
     moved = bent.move("rod", translate=(0.2, 0, 0))
-    np.testing.assert_allclose(moved.part_bounds("rod"), bent.part_bounds("rod") + [0.2, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(
+        moved.part_bounds("rod"), bent.part_bounds("rod") + np.array([0.2, 0, 0]), atol=1e-12
+    )
     anew = moved.with_new_occlusion()
     assert anew.modeled[0].deformation is None
     np.testing.assert_allclose(anew.part_bounds("rod"), moved.part_bounds("rod"), atol=1e-12)
@@ -238,6 +242,6 @@ def test_a_deformed_part_is_moved_and_darkened_anew() -> None:
         ),
     ],
 )
-def test_errors_name_the_cure(call, message) -> None:
+def test_errors_name_the_cure(call: Callable[[], object], message: str) -> None:
     with pytest.raises(SceneError, match=message):
         call()

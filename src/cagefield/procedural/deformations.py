@@ -1,10 +1,10 @@
 """Closed-form bends and twists of parts, with their inverses: the ground truth of bent and twisted edits.
 
-Nothing here uses the code of edits. Points are [3,N], as in `shapes`; results have the type of the points.
+Nothing here uses the code of edits. Points are [3,N], as in `shapes`; results are in their dtype.
 
-Notation: canonical points are those of the part as modeled, deformed ones those of the bent part. In the frame
-of a deformation a point has the coordinate s along the axis, from `start` on. Over 0 <= s <= length the axis
-is bent or twisted; before it nothing moves, after it the part goes on as a rigid body.
+Notation: canonical points are those of the part as modeled, deformed ones those of the bent part. s is the
+coordinate along the axis, from `start` on. Over 0 <= s <= length the axis is bent or twisted; before it
+nothing moves, after it the part goes on as a rigid body.
 
 Source: Barr, "Global and local deformations of solid primitives", SIGGRAPH 1984.
 """
@@ -44,7 +44,7 @@ class Deformation(Protocol):
         """Lower bound [N] of the distance of deformed points to a deformed surface, to first order the
         distance where that is small in a bend.
 
-        `distance` [N] is that of the canonical points to the canonical surface; negative inside, as the bound.
+        `distance` [N] is that of the canonical points to the canonical surface, negative inside as the bound.
         """
         ...
 
@@ -57,7 +57,9 @@ def _frame(axis: ArrayLike, towards: ArrayLike, name: str) -> Array:
     """Rows [3,3]: the unit axis, the unit part of `towards` across it, their cross product."""
     a, b = np.array(axis, np.float64), np.array(towards, np.float64)
     if not (np.isfinite(a).all() and np.isfinite(b).all() and np.linalg.norm(np.cross(a, b)) > 1e-9):
-        raise SceneError(f"axis {axis} and towards {towards} of a {name} must be two different directions")
+        raise SceneError(
+            f"axis {axis!r} and towards {towards!r} of a {name} must be two different directions"
+        )
     a = a / np.linalg.norm(a)
     b = b - (a @ b) * a
     b = b / np.linalg.norm(b)
@@ -80,7 +82,7 @@ class ArcBend:
     """Bend of an axis into an arc of `angle` radians, in (0, pi], that turns towards another direction.
 
     The line through `start` along `axis` keeps its length; its radius is R = length / angle. With b the
-    coordinate along `towards`, (s, b) goes to ((R - b) sin(s/R), R - (R - b) cos(s/R)). Parts must have b < R.
+    coordinate along `towards`, (s, b) goes to ((R - b) sin(s/R), R - (R - b) cos(s/R)); parts have b < R.
     """
 
     start: Vector
@@ -157,8 +159,8 @@ class ArcBend:
         """Lower bound [N], see `Deformation`.
 
         Within d of a point at distance rho from the arc's center lengths grow by R / (rho - d) at most, so
-        that the surface is d = D rho / (R + D) away, or more. No surface that is seen across the cut is nearer
-        than (R - b) sin(angle / 2); b is taken as R / 2 at most.
+        that the surface is d = D rho / (R + D) away, or more. No surface across the cut is nearer than
+        (R - b) sin(angle / 2); b is taken as R / 2 at most.
         """
         s, b, _ = self._local(points)
         rho, size = np.hypot(s, self.radius - b), np.abs(distance)
@@ -170,8 +172,8 @@ class ArcBend:
         low, high = (f((corners - np.array(self.start)) @ self._frame.T, axis=0) for f in (np.min, np.max))
         if high[1] >= self.radius:
             raise SceneError(
-                f"a part reaches {high[1]:.3g} towards the bend, past its radius of {self.radius:.3g}; bend it "
-                "less, or over a greater length"
+                f"a part reaches {high[1]:.3g} towards the bend, past its radius of {self.radius:.3g}; bend "
+                "it less, or over a greater length"
             )
         # of the coordinates, linear in b, the extremes along s are at ends, and at multiples of a right angle
         turns = np.array([0, np.pi / 2, np.pi, self.angle])
