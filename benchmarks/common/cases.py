@@ -2,8 +2,8 @@
 
 The truth of a discrete edit is the scene whose part was really moved, stated here without the edit file: an
 edit that is applied wrongly does not agree with it. The truth of a continuous edit is the scene seen through
-the edit's exact map; inside its cage that of a free-form edit is also the scene whose part is bent, twisted or
-pulled in closed form, without the code of edits.
+the edit's exact map; inside its cage that of a free-form edit is also the scene whose part is bent, twisted
+or pulled in closed form, without the code of edits.
 """
 
 from __future__ import annotations
@@ -125,7 +125,8 @@ FREE_FORM_CASES = (
     Case("microphone", "straighten_cable", deformed=lambda s: s.deform("cable", CABLE_BEND)),
     Case("chair", "pull_crest", deformed=lambda s: s.deform("back", CREST_PULL)),
 )
-"""Edits by lattices, control points and selections; measured where they are named, no other shell has them."""
+"""Edits by lattices, control points and selections, measured where they are named: the other methods of the
+shell have no such cages."""
 
 _STRETCHED = ("tracks", "body", "cabin", "boom", "stick", "bucket", "cone")
 

@@ -16,9 +16,11 @@ from benchmarks.common.workbench import Workbench
 from benchmarks.edits.edits_table import Inside
 from benchmarks.edits.exact_maps import exact
 from cagefield.cameras.camera import Camera
+from cagefield.edits import SpaceMap
 from cagefield.errors import CagefieldError
+from cagefield.geometry.cage import Cage
 from cagefield.procedural import ProceduralScene, procedural_scene
-from cagefield.procedural.tracing import points_along_rays
+from cagefield.procedural.tracing import points_along_rays, trace
 from cagefield.typing import AnyArray, Array, Mask
 
 
@@ -32,12 +34,14 @@ def inside_figures(
 ) -> Inside:
     """Figures of a case from pictures [V,H,W,3] of the field, and photos `before` of the unedited scene."""
     still, deformed = procedural_scene(case.scene), deformed_scene(case)
-    was = np.stack([canonical_inside(case, still, deformed, camera)[0] for camera in cameras])
+    edits = case.edits
+    inner, mapping = edits[-1].inner, exact(edits)
+    was = np.stack([canonical_inside(inner, still, deformed, camera)[0] for camera in cameras])
     now, errors = [], []
     for camera in cameras:
-        mask, points, canonical = canonical_inside(case, deformed, deformed, camera)
+        mask, points, canonical = canonical_inside(inner, deformed, deformed, camera)
         now.append(mask)
-        errors.append(map_errors(case, points, canonical))
+        errors.append(map_errors(mapping, points, canonical))
     mask, error = np.stack(now), np.concatenate(errors)
     return Inside(
         unedited=pooled_psnr(unedited, before, was),
@@ -56,10 +60,10 @@ def deformed_scene(case: Case) -> ProceduralScene:
 
 
 def canonical_inside(
-    case: Case, scene: ProceduralScene, deformed: ProceduralScene, camera: Camera
+    inner: Cage, scene: ProceduralScene, deformed: ProceduralScene, camera: Camera
 ) -> tuple[Mask, Array, Array]:
     """(pixels [H,W] that show a part that `deformed` changes inside the inner cage, points, canonical points
-    [N,3] of these, world units) of a camera's picture of `scene`.
+    [N,3] of these, world units) of a camera's picture of `scene`, which is `deformed` or the scene before.
     """
     changed = {
         part.name
@@ -69,7 +73,7 @@ def canonical_inside(
     origins, directions = camera.rays()
     d = np.ascontiguousarray(directions.T, np.float32)
     origin = origins[0].astype(np.float64)
-    _, _, hits = scene.shoot(origin, d)
+    hits = trace(scene.placed, origin, d)
     points = points_along_rays(origin, d, hits.t).astype(np.float64)
     canonical = points.copy()
     mask = np.zeros(points.shape[1], bool)
@@ -82,13 +86,13 @@ def canonical_inside(
         if item.part.deformation is not None:
             p = item.part.deformation.inverse(p)
         canonical[:, rows] = p
-        mask[rows] = case.edits[-1].inner.contains(p.T)
+        mask[rows] = inner.contains(p.T)
     return mask.reshape(camera.height, camera.width), points.T[mask], canonical.T[mask]
 
 
-def map_errors(case: Case, points: Array, canonical: Array) -> Array:
-    """Distances [N], world units, of the canonical points by the exact map from those [N,3] in closed form."""
+def map_errors(mapping: SpaceMap, points: Array, canonical: Array) -> Array:
+    """Distances [N], world units, of a map's canonical points from those [N,3] in closed form."""
     viewdirs = np.broadcast_to(np.array([0.0, 0.0, 1.0]), points.shape)
-    mapped = exact(case.edits).to_canonical(points, viewdirs)
+    mapped = mapping.to_canonical(points, viewdirs)
     error: Array = np.linalg.norm(np.asarray(mapped.points, np.float64) - canonical, axis=1)
     return error
