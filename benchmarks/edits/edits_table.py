@@ -33,8 +33,8 @@ _INSIDE = ("inside", "inside unedited", "inside edited", "inside lost", "mean er
 _CLOSED_FORM = (
     "Inside: on the pixels that show the bent, twisted or pulled part inside the inner cage, against photos "
     "of the scene whose part has that shape in closed form, light carried along; unedited: on the part's "
-    "pixels before the edit. Errors: of the points that these pixels show, the distance between the canonical "
-    "points by the edit's exact map and in closed form, in thousandths of a world unit."
+    "pixels before the edit. Errors: of the points that these pixels show, the distance of the canonical "
+    "points by the exact map from those in closed form, in thousandths of a world unit."
 )
 _COSTS = ("frame time", "min det J", "max stretch", "map time")
 _LPIPS, _NAIVE = ("LPIPS unedited", "LPIPS edited"), tuple(f"lost, {way}" for way in NAIVE)
