@@ -2,7 +2,8 @@
 
 The truth of a discrete edit is the scene whose part was really moved, stated here without the edit file: an
 edit that is applied wrongly does not agree with it. The truth of a continuous edit is the scene seen through
-the edit's exact map.
+the edit's exact map; inside its cage that of a free-form edit is also the scene whose part is bent, twisted
+or pulled in closed form, without the code of edits.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from cagefield.edits import Continuous, Delete, EditStack, Move
 from cagefield.edits.edit_files import parse_edits
 from cagefield.errors import CagefieldError
 from cagefield.procedural import ProceduralScene
+from cagefield.procedural.deformations import ArcBend, AxialTwist, PointPull
 
 WEIGHT_CENTER = (-0.6493, 0.0, 0.142)
 PINECONE_CENTER = (0.419, -0.3, -0.211)
@@ -26,13 +28,15 @@ PINECONE_CENTER = (0.419, -0.3, -0.211)
 class Case:
     """An edit of a built-in scene: examples/`file` in the package.
 
-    `moved` is the truth of the edit, None where that is the scene seen through the exact map.
+    `moved` is the truth of the edit, None where that is the scene seen through the exact map. `deformed` is
+    the scene of the truth in closed form, of which the inside of the last edit's inner cage is compared.
     """
 
     scene: str
     name: str
     moved: Callable[[ProceduralScene], ProceduralScene] | None = None
     named_file: str | None = None
+    deformed: Callable[[ProceduralScene], ProceduralScene] | None = None
 
     @property
     def file(self) -> str:
@@ -103,6 +107,27 @@ CASES = (
     Case("plant", "delete_flower", lambda s: s.remove("flower")),
 )
 
+ARM_BEND = ArcBend((0.69, -0.11, 0.58), (0, 0, -1), (1, 0, 0), 0.94, np.radians(40))
+STEM_TWIST = AxialTwist((-0.2, 0.12, 0.01), (0, 0, 1), 0.96, np.radians(90))
+CABLE_BEND = ArcBend((-0.05, 0.07, 0.28), (0, 0, -1), (1, 0, 0), 0.3, np.radians(35))
+CREST_PULL = PointPull((-0.57, 0, 0.97), (0.12, 0, 0.22), 0.45)
+
+FREE_FORM_CASES = (
+    Case(
+        "digger",
+        "bend_arm",
+        deformed=lambda s: s.deform(("stick", "bucket"), ARM_BEND).move(
+            ("stick", "bucket"), translate=(0, 0, 0.12)
+        ),
+    ),
+    Case("plant", "twist_stem", deformed=lambda s: s.deform(("plant", "flower"), STEM_TWIST)),
+    Case("plant", "pull_flower", deformed=lambda s: s.move("flower", translate=(0.1, -0.1, 0.12))),
+    Case("microphone", "straighten_cable", deformed=lambda s: s.deform("cable", CABLE_BEND)),
+    Case("chair", "pull_crest", deformed=lambda s: s.deform("back", CREST_PULL)),
+)
+"""Edits by lattices, control points and selections, measured where they are named: the other methods of the
+shell have no such cages."""
+
 _STRETCHED = ("tracks", "body", "cabin", "boom", "stick", "bucket", "cone")
 
 ROOM_CASES = (
@@ -123,14 +148,15 @@ ROOM_CASES = (
 
 
 def chosen(scenes: Sequence[str] = (), names: Sequence[str] = ()) -> tuple[Case, ...]:
-    """The cases of these scenes and of these names; empty means all.
+    """The cases of these scenes and of these names; empty means all but those of free form.
 
     Raises:
         CagefieldError: a scene or a name that no case has, or no case with both.
     """
+    cases = (*CASES, *FREE_FORM_CASES) if names else CASES
     for what, wanted, known in (
-        ("scene", scenes, [case.scene for case in CASES]),
-        ("edit", names, [case.name for case in CASES if not scenes or case.scene in scenes]),
+        ("scene", scenes, [case.scene for case in cases]),
+        ("edit", names, [case.name for case in cases if not scenes or case.scene in scenes]),
     ):
         unknown = [name for name in wanted if name not in known]
         if unknown:
@@ -139,5 +165,5 @@ def chosen(scenes: Sequence[str] = (), names: Sequence[str] = ()) -> tuple[Case,
                 f"{', '.join(dict.fromkeys(known))}"
             )
     return tuple(
-        case for case in CASES if (not scenes or case.scene in scenes) and (not names or case.name in names)
+        case for case in cases if (not scenes or case.scene in scenes) and (not names or case.name in names)
     )

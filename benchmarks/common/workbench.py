@@ -189,6 +189,15 @@ class Workbench:
         what = f"{case.scene}, {case.name}: photos of the truth"
         return self._kept(case.scene, key, what, lambda: self._photographs(scene, cameras), len(cameras))
 
+    def deformed(self, case: Case, cameras: Sequence[Camera]) -> UInt8:
+        """Photos [V,H,W,3] of the scene that a case deforms in closed form, its light carried along."""
+        if case.deformed is None:
+            raise CagefieldError(f"{case.scene} {case.name} has no truth in closed form")
+        scene = case.deformed(procedural_scene(case.scene)).with_modeled_light()
+        key = digest([case.scene, case.name, "deformed", _poses(cameras)], _TRULY_MOVED)
+        what = f"{case.scene}, {case.name}: photos in closed form"
+        return self._kept(case.scene, key, what, lambda: self._photographs(scene, cameras), len(cameras))
+
     def unseen_pixels(self, case: Case, cameras: Sequence[Camera], where: Mask) -> Mask:
         """Pixels [V,H,W] in `where`, of `moved`, that show what none of the photos of the scene showed."""
         scene, moved = _models(case)

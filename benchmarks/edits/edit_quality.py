@@ -13,6 +13,7 @@ from benchmarks.common.figures import changed_pixels, compare, floats, mean_psnr
 from benchmarks.common.perceptual import lpips
 from benchmarks.common.timing import interleaved
 from benchmarks.common.workbench import Workbench
+from benchmarks.edits.closed_forms import inside_figures
 from benchmarks.edits.compare_shells import FINER, continuous, map_time, seen, shown
 from benchmarks.edits.distortion import distortion
 from benchmarks.edits.edits_table import TIMED_EXACTLY, Revealed, Score
@@ -65,6 +66,9 @@ def measure(cases: Sequence[Case], bench: Workbench, *, taught: bool = False) ->
         if truth not in unedited:
             unedited[truth] = seen(scene, cameras, rays)
         pictures = seen(edited, cameras, rays)
+        inside = None
+        if case.deformed is not None:
+            inside = inside_figures(case, bench, cameras, unedited[truth], pictures, before)
         if case.moved is not None:
             revealed = _revealed(case, bench, cameras, unedited[truth], pictures, taught)
         figures = compare(unedited[truth], pictures, before, after)
@@ -87,6 +91,7 @@ def measure(cases: Sequence[Case], bench: Workbench, *, taught: bool = False) ->
             both,
             revealed,
             naive,
+            inside,
         )
 
 

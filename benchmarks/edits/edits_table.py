@@ -29,6 +29,13 @@ _COLUMNS = (
     "unseen", "unseen edited", "lost, seen",
 )  # fmt: skip
 _TAUGHT = ("uncovered taught", "unseen taught")
+_INSIDE = ("inside", "inside unedited", "inside edited", "inside lost", "mean error", "max error")
+_CLOSED_FORM = (
+    "Inside: on the pixels that show the bent, twisted or pulled part inside the inner cage, against photos "
+    "of the scene whose part has that shape in closed form, light carried along; unedited: on the part's "
+    "pixels before the edit. Errors: of the points that these pixels show, the distance of the canonical "
+    "points by the exact map from those in closed form, in thousandths of a world unit."
+)
 _COSTS = ("frame time", "min det J", "max stretch", "map time")
 _LPIPS, _NAIVE = ("LPIPS unedited", "LPIPS edited"), tuple(f"lost, {way}" for way in NAIVE)
 _NAIVELY = (
@@ -72,6 +79,23 @@ class Revealed:
 
 
 @dataclass(frozen=True)
+class Inside:
+    """Figures of a free-form edit inside its inner cage, against the scene deformed in closed form.
+
+    unedited, edited      PSNR (dB) on the pixels that show the deformed part there, before and after
+    pixels                share of all pixels after
+    mean_error, max_error distance, world units, of canonical points by the edit from those in closed form, of
+                          the points that these pixels show
+    """
+
+    unedited: float
+    edited: float
+    pixels: float
+    mean_error: float
+    max_error: float
+
+
+@dataclass(frozen=True)
 class Score:
     """The figures of one case.
 
@@ -91,6 +115,7 @@ class Score:
     lpips: tuple[float, float] | None = None
     revealed: Revealed | None = None
     naive: tuple[float, ...] = ()
+    inside: Inside | None = None
 
 
 def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()) -> Table:
@@ -125,6 +150,8 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
         explained.append(
             "Taught: the same pixels of a field trained as long on as many photos of the truth itself."
         )
+    closed = any(score.inside is not None for score in scores)
+    explained += [_CLOSED_FORM] if closed else []
     perceived = any(score.lpips is not None for score in scores)
     explained += [] if perceived else [lpips()[1]]
     explained += [_NAIVELY] if isinstance(config, SplatConfig) else []
@@ -133,10 +160,11 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
         "Edits against ground truth",
         _COLUMNS
         + (_TAUGHT if taught else ())
+        + (_INSIDE if closed else ())
         + _COSTS
         + (_LPIPS if perceived else ())
         + (_NAIVE if isinstance(config, SplatConfig) else ()),
-        tuple(_row(score, taught, perceived) for score in scores),
+        tuple(_row(score, taught, perceived, closed) for score in scores),
         (*explained, *notes),
         names=4,
         shown=_SHOWN,
@@ -218,7 +246,7 @@ def _below(taught: float | None, edited: float) -> float:
     return _NAN if taught is None else taught - edited
 
 
-def _row(score: Score, taught: bool, perceived: bool) -> tuple[str, ...]:
+def _row(score: Score, taught: bool, perceived: bool, closed: bool) -> tuple[str, ...]:
     figures, measured, taken = score.figures, score.distortion, score.time
     pair = score.lpips or (_NAN, _NAN)
     return (
@@ -238,12 +266,27 @@ def _row(score: Score, taught: bool, perceived: bool) -> tuple[str, ...]:
         number(figures.there_lost),
         number(figures.there_if_left),
         *_revealed(score.revealed, taught),
+        *(_inside(score.inside) if closed else ()),
         f"x{score.frame_ratio:.2f}",
         "-" if measured is None else number(measured.least_det),
         "-" if measured is None else number(measured.stretch),
         "-" if taken is None else f"{taken.per_million:.0f} ms",
         *((number(value, 4) for value in pair) if perceived else ()),
         *(number(value) for value in score.naive),
+    )
+
+
+def _inside(figures: Inside | None) -> tuple[str, ...]:
+    """The cells of the comparison with the closed form."""
+    if figures is None:
+        return ("-",) * len(_INSIDE)
+    return (
+        f"{100 * figures.pixels:.2f}%",
+        number(figures.unedited),
+        number(figures.edited),
+        number(figures.unedited - figures.edited),
+        number(1000 * figures.mean_error),
+        number(1000 * figures.max_error),
     )
 
 

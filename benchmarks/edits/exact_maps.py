@@ -8,7 +8,11 @@ _WITH_KERNEL = ("flow", "trilinear")
 
 
 def exact(edits: EditStack) -> SpaceMap:
-    """The stack's map without its lattices, by the kernel where all its shells have one."""
+    """The stack's map without its lattices, by the kernel where all its shells have one.
+
+    Kernels have no exact map of lattices of control points and of points on their own: that is in float64.
+    """
     stack = EditStack(edit.without_lattice() for edit in edits)
-    shells = {edit.shell.name for edit in stack.active if isinstance(edit, Continuous)}
-    return KernelMap(stack) if shells <= set(_WITH_KERNEL) else stack
+    continuous = [edit for edit in stack.active if isinstance(edit, Continuous)]
+    in_kernel = all(edit.shell.name in _WITH_KERNEL and edit.inner.is_hexahedron for edit in continuous)
+    return KernelMap(stack) if in_kernel else stack

@@ -1,7 +1,8 @@
 """Primitives and parts: textured shapes, their placement, and their motion.
 
 A part is a list of primitives; a primitive is a shape with a texture, placed once or many times. `motion`
-[4,4] takes a part from its place as modeled to its present place; texture and occlusion travel with it.
+[4,4] takes a part from its place as modeled (and deformed, where it has a deformation) to its present place;
+texture and occlusion travel with it.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from cagefield.procedural.deformations import Deformation
 from cagefield.procedural.shapes import Shape
 from cagefield.procedural.textures import Texture
 from cagefield.typing import Array, Float32, Int
@@ -65,11 +67,12 @@ class Primitive:
 
 @dataclass(frozen=True)
 class Part:
-    """Primitives that move together."""
+    """Primitives that move together; those of a part with a `deformation` are in their deformed shapes."""
 
     name: str
     primitives: tuple[Primitive, ...]
     motion: Array = field(default_factory=lambda: np.eye(4))
+    deformation: Deformation | None = None
 
     def __post_init__(self) -> None:
         motion = np.array(self.motion, np.float64)
@@ -90,7 +93,7 @@ class Part:
     def with_baked_motion(self) -> Part:
         """Part as if modeled in its present place: its motion is in its primitives' poses."""
         primitives = tuple(replace(item, poses=self.motion @ item.poses) for item in self.primitives)
-        return replace(self, primitives=primitives, motion=np.eye(4))
+        return replace(self, primitives=primitives, motion=np.eye(4), deformation=None)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from cagefield.cameras.camera import Camera
 from cagefield.errors import SceneError
 from cagefield.images.render_result import Background, RenderResult
+from cagefield.procedural.deformations import Deformation
+from cagefield.procedural.deformed_parts import deform_part
 from cagefield.procedural.occlusion import Occlusion
 from cagefield.procedural.parts import Part, PlacedPrimitive, affine_matrix
 from cagefield.procedural.room_light import Room, RoomLight
@@ -94,6 +96,15 @@ class ProceduralScene:
         return self._with(
             replace(p, motion=moved @ p.motion) if i in chosen else p for i, p in enumerate(self.parts)
         )
+
+    def deform(self, part: str | Sequence[str], deformation: Deformation) -> ProceduralScene:
+        """Scene whose part or parts are bent, twisted or pulled by a deformation of world space.
+
+        Raises SceneError for unknown parts, for those that were moved or deformed before, and for those that
+        reach past a bend's center.
+        """
+        chosen = self._indices(part)
+        return self._with(deform_part(p, deformation) if i in chosen else p for i, p in enumerate(self.parts))
 
     def remove(self, part: str | Sequence[str]) -> ProceduralScene:
         """Scene without a part or parts. Raises SceneError for unknown parts and when none would be left."""

@@ -50,6 +50,12 @@ def shade_surface(
         modeled_points = transform_vectors(inverse[:3, :3], points) + inverse[:3, 3:].astype(np.float32)
         modeled_normals = _unit(transform_vectors(motion[:3, :3].T, normals))
         modeled_dirs = _unit(transform_vectors(inverse[:3, :3], viewdirs))
+    if item.part.deformation is not None:
+        jacobian = item.part.deformation.inverse_jacobian(modeled_points)
+        modeled_dirs = _unit(np.einsum("ijn,jn->in", jacobian, modeled_dirs))
+        to_modeled = np.linalg.inv(np.moveaxis(jacobian, 2, 0))
+        modeled_normals = _unit(np.einsum("nji,jn->in", to_modeled, modeled_normals))
+        modeled_points = item.part.deformation.inverse(modeled_points)
     albedo = item.primitive.texture(local.T, instance)
     if item.primitive.luminous:
         return albedo * np.float32(item.primitive.luminous), normals.T
