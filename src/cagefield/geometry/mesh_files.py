@@ -16,7 +16,7 @@ from cagefield.geometry.mesh_cage import MeshCage
 from cagefield.geometry.triangle_mesh import Triangles, check_edges, signed_volume
 from cagefield.typing import Array
 
-MESH_SUFFIXES: tuple[str, ...] = (".obj", ".ply", ".glb")
+CAGE_FILE_SUFFIXES: tuple[str, ...] = (".obj", ".ply", ".glb")
 
 MAX_MESH_BYTES = 4 << 20
 """Bytes of a file: a hundred times those of the largest mesh cage, for what else it may hold."""
@@ -29,9 +29,9 @@ def read_mesh_cage(path: str | os.PathLike[str]) -> MeshCage:
     formats, files that cannot be read, meshes that are no `MeshCage`, and where trimesh is not installed.
     """
     file = Path(path)
-    if file.suffix.lower() not in MESH_SUFFIXES:
+    if file.suffix.lower() not in CAGE_FILE_SUFFIXES:
         raise CageError(
-            f'{file}: a mesh cage is a {", ".join(MESH_SUFFIXES)} file, got "{file.suffix}"; convert it'
+            f'{file}: a mesh cage is a {", ".join(CAGE_FILE_SUFFIXES)} file, got "{file.suffix}"; convert it'
         )
     try:
         content = read_bytes(file, MAX_MESH_BYTES)

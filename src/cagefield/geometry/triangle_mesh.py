@@ -19,10 +19,10 @@ MAX_MESH_VERTICES = 512
 
 Triangles = NDArray[np.int64]
 
-_SMALL = 1e-9
+_FLAT_SHARE = 1e-9
 """Least area of a triangle, and volume of a mesh, as a share of its extent to the power 2 or 3."""
 
-_CHUNK = 100_000
+_PAIRS_AT_A_TIME = 100_000
 """Pairs of points and triangles at a time."""
 
 
@@ -51,11 +51,11 @@ def closed_mesh(vertices: ArrayLike, triangles: ArrayLike) -> tuple[Array, Trian
     check_edges(t)
     size = float(np.ptp(v, axis=0).max())
     areas = 0.5 * np.linalg.norm(np.cross(v[t[:, 1]] - v[t[:, 0]], v[t[:, 2]] - v[t[:, 0]]), axis=1)
-    if areas.min() <= _SMALL * size**2:
+    if areas.min() <= _FLAT_SHARE * size**2:
         k = int(np.argmin(areas))
         raise CageError(f"triangle {k} of the mesh, vertices {t[k].tolist()}, is flat; merge its vertices")
     volume = signed_volume(v, t)
-    if abs(volume) <= _SMALL * size**3:
+    if abs(volume) <= _FLAT_SHARE * size**3:
         raise CageError("mesh encloses no volume; give it a thickness")
     if volume < 0.0:
         raise CageError(
@@ -126,7 +126,7 @@ def signed_volume(v: Array, t: Triangles) -> float:
 def winding_numbers(v: Array, t: NDArray[np.integer], points: Array) -> Array:
     """Winding numbers [N] of a closed mesh around points [N,3]: 1 inside, 0 outside."""
     found = np.empty(len(points))
-    chunk = max(1, _CHUNK // len(t))
+    chunk = max(1, _PAIRS_AT_A_TIME // len(t))
     for first in range(0, len(points), chunk):
         rows = points[first : first + chunk]
         a, b, c = (v[t[:, n]][None] - rows[:, None] for n in range(3))

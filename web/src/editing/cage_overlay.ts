@@ -65,7 +65,7 @@ export function cageOverlay(
     const cages = shownCages(edit, drag);
     const tint = color(edit.colour);
     addCage(out, cages.deformed, tint, OTHER);
-    if (edit.cage === "points") addPoints(out, cages.deformed, tint);
+    if (hasOwnPoints(edit)) addPoints(out, cages.deformed, tint);
     if (cages.outer && edit.kind === "continuous" && !edit.outer_follows)
       addCage(out, cages.outer, tint, OTHER_OUTER);
   }
@@ -78,6 +78,11 @@ export function cageOverlay(
     addPolyline(out, circle(center, drag.operation.radius!, forward), WHITE, REACH);
   }
   return out;
+}
+
+/** Whether points are drawn by themselves: those of a lattice are on its net. */
+function hasOwnPoints(edit: EditState): boolean {
+  return edit.cage === "points" || edit.cage === "mesh";
 }
 
 function addSelectedEdit(
@@ -100,7 +105,7 @@ function addSelectedEdit(
   }
   addCage(out, first, tint, edit.cage === "lattice" ? NET : INNER, dim);
   if (dragObstacle(editor, edit) !== null) {
-    if (edit.cage === "points") addPoints(out, first, tint);
+    if (hasOwnPoints(edit)) addPoints(out, first, tint);
     return;
   }
   for (const { cage: name, posed } of draggableCages(editor, cages)) {

@@ -622,7 +622,7 @@ export interface EditState {
   inner: Corners;
   deformed: Corners;
   outer: Corners | null;
-  cage: "box" | "lattice" | "points";
+  cage: "box" | "lattice" | "points" | "mesh";
   points: PointsState | null;
   outer_follows: boolean;
   pivot: Vec3;

@@ -86,8 +86,8 @@ export function pointOptions(app: App, actions: Actions, pane: Pane): PointOptio
     show(edit) {
       shown = edit;
       const { points } = edit;
-      lattice.hidden = edit.kind !== "continuous" || edit.cage === "points";
-      bend.hidden = edit.cage !== "lattice";
+      lattice.hidden = edit.kind !== "continuous" || edit.cage === "points" || edit.cage === "mesh";
+      bend.hidden = edit.cage !== "lattice" && edit.cage !== "mesh";
       reach.hidden = edit.cage !== "points";
       model.curve = app.store.now.curve;
       if (points?.radius != null && points.falloff !== null)

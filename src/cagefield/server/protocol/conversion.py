@@ -16,6 +16,7 @@ from cagefield.edits.options import CastShadow
 from cagefield.errors import CameraError
 from cagefield.geometry.cage import Cage, LatticeCage
 from cagefield.geometry.control_points import ControlPoints
+from cagefield.geometry.mesh_cage import MeshCage
 from cagefield.selection.element_selection import Selection
 from cagefield.server.editor.document import Entry
 from cagefield.server.editor.drag_solver import Moved, move_corners
@@ -121,10 +122,12 @@ def points_state(edit: Edit) -> server_messages.PointsState | None:
     )
 
 
-def _cage_kind(points: server_messages.PointsState | None) -> Literal["box", "lattice", "points"]:
-    if points is None:
+def _cage_kind(cage: Cage) -> Literal["box", "lattice", "points", "mesh"]:
+    if cage.is_hexahedron:
         return "box"
-    return "points" if points.shape is None else "lattice"
+    if isinstance(cage, MeshCage):
+        return "mesh"
+    return "lattice" if isinstance(cage, LatticeCage) else "points"
 
 
 def edit_state(
@@ -152,7 +155,7 @@ def edit_state(
         inner=corners(cage_in_scene(edit)),
         deformed=corners(edit.deformed),
         outer=None if settings.outer is None else corners(settings.outer),
-        cage=_cage_kind(points),
+        cage=_cage_kind(edit.inner),
         points=points,
         outer_follows=settings.outer is not None and settings.outer.follows_edit,
         pivot=vec3(edit.deformed.pivot),

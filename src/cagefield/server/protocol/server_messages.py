@@ -86,10 +86,10 @@ class EditState(Message):
     inner: Corners
     deformed: Corners
     outer: Corners | None
-    cage: Literal["box", "lattice", "points"]
-    """Kind of the inner cage; corners of the last two are those of a box around them."""
+    cage: Literal["box", "lattice", "points", "mesh"]
+    """Kind of the inner cage; corners of the last three are those of a box around them."""
     points: PointsState | None
-    """Control points of a lattice, or points on their own."""
+    """Control points of a lattice, points on their own, or the vertices of a mesh."""
     outer_follows: bool
     """True where the outer cage is made anew with the operations, and confines none."""
     pivot: Vec3

@@ -6,7 +6,7 @@ coordinates in 3D" (2005): a triangle seen in the unit vectors u_1, u_2, u_3 add
     m = 1/2 sum_i theta_i n_i,    w_i = m . (u_(i+1) x u_(i-1)) / (u_1 . (u_2 x u_3)),
 
 n_i the unit normal of u_(i+1) x u_(i-1), theta_i the angle between these two. Each edge is computed once for
-its two triangles. `LANES` points go through together: the innermost loops run over them.
+its two triangles. `MESH_LANES` points go through together: the innermost loops run over them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from cagefield.compute.numba_cache import FAST, njit
 
 U = np.uintp
 
-LANES = 32
+MESH_LANES = 32
 
 _LEAST_DET = 1e-10
 """Least |u_1 . (u_2 x u_3)|: below it the point is in the plane of the triangle."""
@@ -40,12 +40,12 @@ def _see(x, vertices, edges, u, near, arc, cross, away):
     """Writes u [V,3,L] and near [V,L] = 1 / r of the vertices from x [3,L]; of the edges, cross [E,3,L] =
     u_a x u_b and arc [E,L] = theta / (2 sin theta); and away [L], the squared distance from the edges."""
     for j in range(U(len(vertices))):
-        for l in range(U(LANES)):
+        for l in range(U(MESH_LANES)):
             d0, d1, d2 = vertices[j, 0] - x[0, l], vertices[j, 1] - x[1, l], vertices[j, 2] - x[2, l]
             r = 1.0 / np.sqrt(d0 * d0 + d1 * d1 + d2 * d2 + 1e-300)
             near[j, l] = r
             u[j, 0, l], u[j, 1, l], u[j, 2, l] = r * d0, r * d1, r * d2
-    for l in range(U(LANES)):
+    for l in range(U(MESH_LANES)):
         away[l] = 1e300
     for e in range(U(len(edges))):
         a, b = U(edges[e, 0]), U(edges[e, 1])
@@ -55,7 +55,7 @@ def _see(x, vertices, edges, u, near, arc, cross, away):
             vertices[b, 2] - vertices[a, 2],
         )
         square = g0 * g0 + g1 * g1 + g2 * g2
-        for l in range(U(LANES)):
+        for l in range(U(MESH_LANES)):
             a0, a1, a2 = u[a, 0, l], u[a, 1, l], u[a, 2, l]
             b0, b1, b2 = u[b, 0, l], u[b, 1, l], u[b, 2, l]
             c0, c1, c2 = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
@@ -81,7 +81,7 @@ def _see(x, vertices, edges, u, near, arc, cross, away):
             sine = np.sqrt(max(c0 * c0 + c1 * c1 + c2 * c2, 1e-24))
             behind = 1.0 if c < 0.0 else 0.0
             arc[e, l] = (0.5 - behind) * sharp + 0.5 * np.pi * behind / sine
-        for l in range(U(LANES)):
+        for l in range(U(MESH_LANES)):
             a0, a1, a2 = u[a, 0, l], u[a, 1, l], u[a, 2, l]
             r = 1.0 / near[a, l]
             t = min(max(-r * (a0 * g0 + a1 * g1 + a2 * g2) / square, 0.0), 1.0)
@@ -90,12 +90,12 @@ def _see(x, vertices, edges, u, near, arc, cross, away):
 
 
 @njit(**FAST)
-def _weigh(x, vertices, faces, sides, signs, walls, motion, u, near, arc, cross, away, sums):
+def _weigh(x, faces, sides, signs, walls, motion, u, near, arc, cross, away, sums):
     """Adds all triangles to sums [8,L]: weights and weighted motion, first signed, then their sizes; lowers
     away [L] to the squared distance from the triangles."""
-    part = np.empty((4, LANES))
+    part = np.empty((4, MESH_LANES))
     for n in range(8):
-        for l in range(U(LANES)):
+        for l in range(U(MESH_LANES)):
             sums[n, l] = 0.0
     for f in range(U(len(faces))):
         i, j, k = U(faces[f, 0]), U(faces[f, 1]), U(faces[f, 2])
@@ -108,7 +108,7 @@ def _weigh(x, vertices, faces, sides, signs, walls, motion, u, near, arc, cross,
         i0, i1, i2 = motion[i, 0], motion[i, 1], motion[i, 2]
         j0, j1, j2 = motion[j, 0], motion[j, 1], motion[j, 2]
         k0, k1, k2 = motion[k, 0], motion[k, 1], motion[k, 2]
-        for l in range(U(LANES)):
+        for l in range(U(MESH_LANES)):
             p0, p1, p2 = sp * cross[p, 0, l], sp * cross[p, 1, l], sp * cross[p, 2, l]
             q0, q1, q2 = sq * cross[q, 0, l], sq * cross[q, 1, l], sq * cross[q, 2, l]
             s0, s1, s2 = ss * cross[s, 0, l], ss * cross[s, 1, l], ss * cross[s, 2, l]
@@ -127,10 +127,10 @@ def _weigh(x, vertices, faces, sides, signs, walls, motion, u, near, arc, cross,
             part[3, l] = wi * i2 + wj * j2 + wk * k2
         # Loops of their own: in one with the other, compilers use no vector instructions.
         for n in range(U(4)):
-            for l in range(U(LANES)):
+            for l in range(U(MESH_LANES)):
                 sums[n, l] += part[n, l]
                 sums[n + U(4), l] += part[n, l] if part[0, l] >= 0.0 else -part[n, l]
-        for l in range(U(LANES)):
+        for l in range(U(MESH_LANES)):
             h = h0 * x[0, l] + h1 * x[1, l] + h2 * x[2, l] - h3
             a = a0 * x[0, l] + a1 * x[1, l] + a2 * x[2, l] - a3
             b = b0 * x[0, l] + b1 * x[1, l] + b2 * x[2, l] - b3
@@ -151,18 +151,18 @@ def blend_motion(places, vertices, edges, faces, sides, signs, walls, motion, ou
     all positive: a mean of the vertices' motion that does not grow with the distance. Both are the motion of
     the surface on it. The sum of the weights is positive inside, negative outside.
     """
-    blocks = (len(places) + LANES - 1) // LANES
+    blocks = (len(places) + MESH_LANES - 1) // MESH_LANES
     for part in prange(blocks):
-        first = np.intp(part) * LANES
-        x, away, sums = np.empty((3, LANES)), np.empty(LANES), np.empty((8, LANES))
-        u, near = np.empty((len(vertices), 3, LANES)), np.empty((len(vertices), LANES))
-        cross, arc = np.empty((len(edges), 3, LANES)), np.empty((len(edges), LANES))
-        for l in range(U(LANES)):
+        first = np.intp(part) * MESH_LANES
+        x, away, sums = np.empty((3, MESH_LANES)), np.empty(MESH_LANES), np.empty((8, MESH_LANES))
+        u, near = np.empty((len(vertices), 3, MESH_LANES)), np.empty((len(vertices), MESH_LANES))
+        cross, arc = np.empty((len(edges), 3, MESH_LANES)), np.empty((len(edges), MESH_LANES))
+        for l in range(U(MESH_LANES)):
             row = min(first + l, len(places) - 1)
             x[0, l], x[1, l], x[2, l] = places[row, 0], places[row, 1], places[row, 2]
         _see(x, vertices, edges, u, near, arc, cross, away)
-        _weigh(x, vertices, faces, sides, signs, walls, motion, u, near, arc, cross, away, sums)
-        for l in range(min(LANES, len(places) - first)):
+        _weigh(x, faces, sides, signs, walls, motion, u, near, arc, cross, away, sums)
+        for l in range(min(MESH_LANES, len(places) - first)):
             outside = 0 if sums[0, l] > 0.0 else 4
             for n in range(3):
                 out[first + l, n] = sums[outside + 1 + n, l] / sums[outside, l]
