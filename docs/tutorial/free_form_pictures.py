@@ -1,8 +1,7 @@
-"""Draws the pictures of the tutorial's second page: a bend, a twist and a pull in the editor.
+"""Draws the pictures of the tutorial's second page: a bend and a pull in the editor.
 
     python docs/tutorial/free_form_pictures.py digger SCENE
     python docs/tutorial/free_form_pictures.py nose SCENE       # of the digger, too
-    python docs/tutorial/free_form_pictures.py plant SCENE
 
 SCENE is the built-in scene, trained; it is copied first and left as it is. Cages are pasted as
 text; everything else is done with the mouse and in the panel.
@@ -21,14 +20,7 @@ ARM = """\
 edits:
   - name: bend the arm
     inner: {center: [0.69, -0.11, 0.11], size: [0.44, 0.42, 0.94]}
-    outer: {center: [0.895, -0.11, 0.43], size: [1.27, 0.9, 1.66]}
-"""
-
-STEM = """\
-edits:
-  - name: twist the stem
-    inner: {center: [-0.2, 0.12, 0.49], size: [1.0, 1.0, 0.96]}
-    outer: {center: [-0.2, 0.12, 0.52], size: [1.7, 1.7, 1.14]}
+    outer: {center: [0.895, -0.11, 0.439], size: [1.27, 0.9, 1.642]}
 """
 
 CABIN: Point = (490, 392)
@@ -38,7 +30,7 @@ CABIN: Point = (490, 392)
 def main() -> None:
     """Runs a session."""
     name, path = sys.argv[1:]
-    session = {"digger": digger, "nose": nose, "plant": plant}[name]
+    session = {"digger": digger, "nose": nose}[name]
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / name
         shutil.copytree(path, scene)
@@ -73,18 +65,6 @@ def nose(editor: EditorPage) -> None:
     editor.fill("Radius", 0.3)
     dragged(editor, "Y", (-1, 0), axis=1, by=0.2)
     shot(editor, "nose")
-
-
-def plant(editor: EditorPage) -> None:
-    """The stem twisted by a quarter turn, with its lattice."""
-    turned(editor, (-200, -20))
-    pasted(editor, STEM)
-    subdivided(editor, cells_along_z=7)
-    editor.tools(mode="edit", tool="select")
-    unfolded(editor, "Bend, twist, taper")
-    filled(editor, "Angle", 90)
-    editor.changed(lambda: clicked(editor, "Twist"))
-    shot(editor, "twisted")
 
 
 def subdivided(editor: EditorPage, *, cells_along_z: int) -> None:
