@@ -49,13 +49,15 @@ def axis_mask(brick: qd.i32, first: qd.i32, last: qd.i32, upper: qd.i32):
 def is_dense(image: vec3, r: vec3, place: qd.i32, grid: GridArgs):
     """1 where a cell within r of an image, grid coordinates, holds density, else 0.
 
-    The place is that of the layer that is searched, 0 for the field.
+    The place is that of the layer that is searched, 0 for the field. Slices of the grid that the layer does
+    not store may be those of the next layer, or lie past the index, which is not read there.
     """
+    slices = grid.index.shape[0] // (grid.resolution.y * grid.resolution.z)
     first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)
     last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, grid.resolution - 1)
     found = 0
     x = first.x
-    while x <= last.x and found == 0:
+    while x <= qd.min(last.x, slices - 1 - place) and found == 0:
         for y in range(first.y, last.y + 1):
             for z in range(first.z, last.z + 1):
                 vertex = ((x + place) * grid.resolution.y + y) * grid.resolution.z + z
