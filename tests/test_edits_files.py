@@ -44,7 +44,7 @@ edits:
 
 def test_the_example_in_the_docstring_is_an_edit_file() -> None:
     text = textwrap.dedent((edit_files.__doc__ or "").split("\n\n")[1])
-    with pytest.raises(EditFileError, match=r"edits\[5\]\.inner\.mesh: a mesh file is read from an edit file"):
+    with pytest.raises(EditFileError, match=r"edits\[5\]\.inner\.mesh: a mesh file is read"):
         parse_edits(text)
     *known, _ = text.split("  - name:")
     first, second, third, fourth, fifth = parse_edits("  - name:".join(known))
