@@ -20,7 +20,7 @@ ARM = """\
 edits:
   - name: bend the arm
     inner: {center: [0.69, -0.11, 0.11], size: [0.44, 0.42, 0.94]}
-    outer: {center: [0.895, -0.11, 0.434], size: [1.27, 0.9, 1.652]}
+    outer: {center: [0.965, -0.11, 0.434], size: [1.13, 0.9, 1.652]}
 """
 
 CABIN: Point = (490, 392)
