@@ -1,7 +1,8 @@
-"""Draws the pictures of the tutorial's second page: a bend and a pull in the editor.
+"""Draws the pictures of the tutorial's second page: a bend, a twist and a pull in the editor.
 
     python docs/tutorial/free_form_pictures.py digger SCENE
     python docs/tutorial/free_form_pictures.py nose SCENE       # of the digger, too
+    python docs/tutorial/free_form_pictures.py plant SCENE
 
 SCENE is the built-in scene, trained; it is copied first and left as it is. Cages are pasted as
 text; everything else is done with the mouse and in the panel.
@@ -23,6 +24,13 @@ edits:
     outer: {center: [0.965, -0.11, 0.434], size: [1.13, 0.9, 1.652]}
 """
 
+STEM = """\
+edits:
+  - name: twist the stem
+    inner: {center: [-0.2, 0.12, 0.49], size: [1.0, 1.0, 0.96]}
+    outer: {center: [-0.2, 0.12, 0.52], size: [1.7, 1.7, 1.14]}
+"""
+
 CABIN: Point = (490, 392)
 """Pixel of the cabin's side window in the view of `nose`."""
 
@@ -30,7 +38,7 @@ CABIN: Point = (490, 392)
 def main() -> None:
     """Runs a session."""
     name, path = sys.argv[1:]
-    session = {"digger": digger, "nose": nose}[name]
+    session = {"digger": digger, "nose": nose, "plant": plant}[name]
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / name
         shutil.copytree(path, scene)
@@ -47,7 +55,7 @@ def digger(editor: EditorPage) -> None:
     subdivided(editor, cells_along_z=7)
     editor.tools(mode="edit", tool="translate")
     shot(editor, "lattice")
-    dragged(editor, "Z", (0, -1), axis=2, by=0.1)
+    dragged(editor, "Z", (0, -1), axis=2, by=0.15)
     unfolded(editor, "Bend, twist, taper")
     chosen(editor, "Fixed end", "End")
     filled(editor, "Angle", 40)
@@ -65,6 +73,18 @@ def nose(editor: EditorPage) -> None:
     editor.fill("Radius", 0.3)
     dragged(editor, "Y", (-1, 0), axis=1, by=0.2)
     shot(editor, "nose")
+
+
+def plant(editor: EditorPage) -> None:
+    """The stem twisted by a quarter turn, with its lattice."""
+    turned(editor, (-200, -20))
+    pasted(editor, STEM)
+    subdivided(editor, cells_along_z=7)
+    editor.tools(mode="edit", tool="select")
+    unfolded(editor, "Bend, twist, taper")
+    filled(editor, "Angle", 90)
+    editor.changed(lambda: clicked(editor, "Twist"))
+    shot(editor, "twisted")
 
 
 def subdivided(editor: EditorPage, *, cells_along_z: int) -> None:
