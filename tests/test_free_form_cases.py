@@ -66,7 +66,8 @@ def test_cages_are_of_their_kind(case: Case, edits: EditStack) -> None:
 def test_outside_the_cages_nothing_moves(case: Case, edits: EditStack) -> None:
     low, high = edits[-1].bounds
     scene = procedural_scene(case.scene)
-    p = np.random.default_rng(0).uniform(*(scene.bounds * 1.2), (4000, 3))
+    start, end = 1.2 * scene.bounds
+    p = np.random.default_rng(0).uniform(start, end, (4000, 3))
     p = p[((p < low) | (p > high)).any(axis=1)]
     assert len(p) > 500
     np.testing.assert_array_equal(edits.to_canonical(p, np.eye(3)[[2]].repeat(len(p), 0)).points, p)
