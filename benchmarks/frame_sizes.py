@@ -2,7 +2,8 @@
 
     python -m benchmarks.frame_sizes SCENE... [--device cuda] [-o benchmarks/results/frame_sizes_cuda.md]
 
-The edits are a continuous turn, a continuous move, and a discrete move, inpainted and relit. Unedited and
+The edits are a continuous turn, a continuous move, and a discrete move, inpainted and relit; of voxels with
+nodes of the maps as the editor has them (`--lattice 64`), or exact (`--lattice 0`). Unedited and
 edited frames are timed in turn, by the wall, from the call to the 8-bit picture in main memory; the first
 frame of a scene is timed alone, with what it compiles or loads.
 """
@@ -42,7 +43,7 @@ def content(scene: Scene) -> NDArray[np.float64]:
     return lower + grid / (np.array(field.resolution) - 1) * (upper - lower)
 
 
-def three_edits(scene: Scene) -> EditStack:
+def three_edits(scene: Scene, lattice: int | None = None) -> EditStack:
     """A turn in the middle of the content, a move of a second part, and a discrete move of a third.
 
     Cages are .3 of the content's longest side, which leaves out a twentieth at either end; their middles lie
@@ -59,8 +60,10 @@ def three_edits(scene: Scene) -> EditStack:
     aside = np.roll([0.3 * size, 0.0, 0.0], axis + 1)
     return EditStack(
         [
-            Edit.continuous(first, first.grown(0.3 * size)).rotate(np.roll([0.26, 0.0, 0.0], axis)),
-            Edit.continuous(second, second.grown(0.3 * size)).translate(0.5 * aside),
+            Edit.continuous(first, first.grown(0.3 * size), lattice=lattice).rotate(
+                np.roll([0.26, 0.0, 0.0], axis)
+            ),
+            Edit.continuous(second, second.grown(0.3 * size), lattice=lattice).translate(0.5 * aside),
             Edit.move(third).translate(aside),
         ]
     )
@@ -79,10 +82,10 @@ def frames(scene: Scene, cameras: Sequence[Camera]) -> None:
         scene.render(camera).rgb8()
 
 
-def rows_of(path: Path, rounds: int, pictures: Path | None) -> list[tuple[str, ...]]:
+def rows_of(path: Path, rounds: int, lattice: int | None, pictures: Path | None) -> list[tuple[str, ...]]:
     """Rows of one scene."""
     scene = Scene.open(path)
-    edited = scene.with_edits(three_edits(scene))
+    edited = scene.with_edits(three_edits(scene, lattice))
     firsts = {}
     for which in (scene, edited):
         began = time.perf_counter()
@@ -111,11 +114,15 @@ def main() -> None:
     parser.add_argument("scenes", nargs="+", type=Path)
     parser.add_argument("--device", default="auto")
     parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--lattice", type=int, default=64)
     parser.add_argument("--pictures", type=Path)
     parser.add_argument("-o", "--out", type=Path)
     options = parser.parse_args()
     devices.start(options.device)
-    rows = [row for path in options.scenes for row in rows_of(path, options.rounds, options.pictures)]
+    lattice = options.lattice or None
+    rows = [
+        row for path in options.scenes for row in rows_of(path, options.rounds, lattice, options.pictures)
+    ]
     names = " ".join(path.name for path in options.scenes)
     table = Table(
         "Frames by size",
@@ -125,7 +132,8 @@ def main() -> None:
             f"Medians of {options.rounds} rounds over 4 cameras; first edited: with edits prepared, inpainted"
             " and relit.",
             f"Machine: {Machine.here()}",
-            f"Command: `python -m benchmarks.frame_sizes {names} --device {options.device}`",
+            f"Command: `python -m benchmarks.frame_sizes {names} --device {options.device}"
+            f" --lattice {options.lattice}`",
         ),
         names=2,
     )

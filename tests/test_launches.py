@@ -2,9 +2,10 @@
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
+import threading
 from dataclasses import dataclass
 
-from cagefield.compute import devices
+from cagefield.compute import devices, quadrants
 from cagefield.compute.quadrants import qd
 
 F32 = qd.types.ndarray(dtype=qd.f32, ndim=1)
@@ -37,3 +38,14 @@ def test_launches_take_no_arguments_of_earlier_ones() -> None:
         assert out[0] == n + (2.0 if n % 3 else 1.0)
         del args
     assert len(addresses) < 50, "no address was used twice: the test shows nothing"
+
+
+def test_arrays_are_freed_by_the_thread_that_made_them() -> None:
+    devices.start()
+    held = [qd.ndarray(qd.f32, (4,))]
+    collector = threading.Thread(target=held.clear)
+    collector.start()
+    collector.join()
+    assert len(quadrants._collected) == 1
+    qd.ndarray(qd.f32, (4,))
+    assert not quadrants._collected

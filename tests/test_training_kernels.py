@@ -13,7 +13,7 @@ from cagefield.datasets.views import View
 
 devices.start()
 
-from cagefield.rendering.voxels.device_grid import to_device  # noqa: E402
+from cagefield.compute.device_buffers import to_device  # noqa: E402
 from cagefield.rendering.voxels.kernels.grid import ivec3  # noqa: E402
 from cagefield.training.voxels.grid_state import GridState, cell_sizes  # noqa: E402
 from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS  # noqa: E402

@@ -1,4 +1,4 @@
-"""Arrays on the compute device that one owner reuses from call to call."""
+"""Arrays on the compute device: copies of numpy arrays, and memory that an owner reuses."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.compute import devices
 from cagefield.compute.quadrants import qd
 
 _TYPES = {np.dtype(np.float32): qd.f32, np.dtype(np.int32): qd.i32, np.dtype(np.uint8): qd.u8}
@@ -71,3 +72,38 @@ class DeviceBuffers:
 def empty_array(size: int, dtype: Any = np.float32) -> Any:
     """Uninitialized flat array on the device, of at least one value."""
     return qd.ndarray(dtype=_TYPES[np.dtype(dtype)], shape=(max(1, size),))
+
+
+def to_device(values: NDArray[Any]) -> Any:
+    """Flat array on the device with the values of a numpy array (float32, int32 or uint8)."""
+    flat = np.ascontiguousarray(values).reshape(-1)
+    if flat.size == 0:
+        flat = np.zeros(1, flat.dtype)
+    array = empty_array(flat.size, flat.dtype)
+    array.from_numpy(flat)
+    return array
+
+
+def for_kernels(values: NDArray[Any]) -> Any:
+    """A flat array to hand to kernels: the numpy array itself on the CPU, else one on the device."""
+    if devices.current() != "cpu" or values.size == 0:
+        return to_device(values)
+    return np.ascontiguousarray(values).reshape(-1)
+
+
+def rows_for_kernels(values: NDArray[np.float32]) -> Any:
+    """A matrix [N,K] to hand to kernels: the numpy array itself on the CPU, else one on the device."""
+    if devices.current() == "cpu":
+        return values
+    array = qd.ndarray(dtype=qd.f32, shape=values.shape)
+    array.from_numpy(np.ascontiguousarray(values))
+    return array
+
+
+def vectors_for_kernels(values: NDArray[np.float32]) -> Any:
+    """Vectors [N,3] to hand to kernels: the numpy array itself on the CPU, else one on the device."""
+    if devices.current() == "cpu":
+        return values
+    array = qd.Vector.ndarray(3, qd.f32, (len(values),))
+    array.from_numpy(np.ascontiguousarray(values))
+    return array

@@ -6,11 +6,16 @@ A PyTorch that is already loaded stays in use, and one loaded later can be used:
 Quadrants 1.3 keeps the arguments of launches by the identity of the objects that were passed, as long as the
 arrays in them live. A new frozen dataclass at the address of one that is gone would launch with the fields of
 the old one, another camera or photo; so no launch is kept.
+
+CUDA frees memory only in threads that have its context, and ends the program in others. Python collects
+garbage in whichever thread asks for memory; so an array that is collected elsewhere waits until the thread
+that made the first one makes or frees another.
 """
 
 from __future__ import annotations
 
 import sys
+import threading
 from typing import Any, cast
 
 _HIDDEN = "torch" not in sys.modules
@@ -19,7 +24,9 @@ if _HIDDEN:
     sys.modules["torch"] = cast(Any, None)
 try:
     import quadrants as qd
+    from quadrants.lang import impl
     from quadrants.lang._fast_caching import args_hasher
+    from quadrants.lang._ndarray import Ndarray
     from quadrants.lang.kernel import LaunchContextBufferCache
 finally:
     if _HIDDEN:
@@ -33,6 +40,43 @@ def _keep_no_launch(*_: object) -> None:
 
 
 LaunchContextBufferCache.cache = _keep_no_launch  # type: ignore[method-assign, unused-ignore]
+
+_owner: int | None = None
+"""Thread that made the first device array."""
+_collected: list[tuple[Any, Any]] = []
+"""Runtimes and arrays that other threads collected."""
+_construct = Ndarray.__init__
+
+
+def _own(array: Any) -> None:
+    """Stands for `Ndarray.__init__`; see above."""
+    global _owner
+    if _owner is None:
+        _owner = threading.get_ident()
+    _construct(array)
+    _free_collected()
+
+
+def _free(array: Any) -> None:
+    """Stands for `Ndarray.__del__`; see above."""
+    program = impl.get_runtime()._prog if impl is not None and impl.get_runtime() is not None else None
+    if program is None or getattr(array, "arr", None) is None:
+        return
+    _collected.append((program, array.arr))
+    _free_collected()
+
+
+def _free_collected() -> None:
+    if threading.get_ident() != _owner:
+        return
+    while _collected:
+        program, memory = _collected.pop()
+        if program is impl.get_runtime()._prog:
+            program.delete_ndarray(memory)
+
+
+Ndarray.__init__ = _own
+Ndarray.__del__ = _free
 
 
 def take_tensors(tensor: type) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cagefield.compute import devices
 from cagefield.compute.block_cyclic import block_cyclic_schedule
+from cagefield.compute.device_buffers import rows_for_kernels, vectors_for_kernels
 from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.edits.buffer_pool import BufferPool
 from cagefield.edits.device.kernels.device_stack import map_samples
@@ -89,8 +90,9 @@ class DeviceStack:
 
     @cached_property
     def args(self) -> EditArgs:
-        """The stack as kernels take it."""
-        return EditArgs(self.params, self.lattice, self.n_edits)
+        """The stack as kernels take it; on a GPU its arrays are uploaded once and stay there."""
+        devices.start()
+        return EditArgs(rows_for_kernels(self.params), vectors_for_kernels(self.lattice), self.n_edits)
 
     @cached_property
     def has_flows(self) -> bool:

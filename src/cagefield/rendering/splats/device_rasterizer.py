@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
-from cagefield.compute.device_buffers import DeviceBuffers, empty_array
+from cagefield.compute.device_buffers import DeviceBuffers, empty_array, to_device
 from cagefield.compute.devices import floats, ints
 from cagefield.rendering.device_image import DeviceSums, SumBuffers
 from cagefield.rendering.splats.device_sorting import passes_of, sort_scratch
@@ -23,7 +23,6 @@ from cagefield.rendering.splats.kernels.blending import T_MIN
 from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE_PX
 from cagefield.rendering.splats.raster_splats import DeformedSplats
 from cagefield.rendering.splats.rasterizer import DEPTH, Region, intrinsics, untiled, world_to_camera
-from cagefield.rendering.voxels.device_grid import to_device
 from cagefield.typing import Float32
 
 _FARTHEST = 1e9

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.compute import devices
+from cagefield.compute.device_buffers import to_device
 from cagefield.compute.devices import floats, ints
 from cagefield.compute.quadrants import qd
 from cagefield.fields.voxel_field import VoxelField
@@ -24,24 +24,6 @@ from cagefield.rendering.voxels.kernels.grid import GridArgs
 from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs
 from cagefield.rendering.voxels.occupancy import BRICK, Occupancy
 from cagefield.typing import Array
-
-
-def to_device(values: NDArray[np.generic]) -> qd.ndarray:
-    """A flat device array with the values of a numpy array (float32, int32 or uint8)."""
-    flat = np.ascontiguousarray(values).reshape(-1)
-    if flat.size == 0:
-        flat = np.zeros(1, flat.dtype)
-    kinds = {np.dtype(np.float32): qd.f32, np.dtype(np.int32): qd.i32, np.dtype(np.uint8): qd.u8}
-    array = qd.ndarray(dtype=kinds[flat.dtype], shape=(flat.size,))
-    array.from_numpy(flat)
-    return array
-
-
-def for_kernels(values: NDArray[np.generic]) -> Any:
-    """A flat array to hand to kernels: the numpy array itself on the CPU, else one on the device."""
-    if devices.current() != "cpu" or values.size == 0:
-        return to_device(values)
-    return np.ascontiguousarray(values).reshape(-1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -50,9 +50,10 @@ class VoxelRenderer:
     ) -> None:
         """Raises EditError where an edit cannot be evaluated, DeviceError where no device starts."""
         devices.start()
+        from cagefield.compute.device_buffers import to_device
         from cagefield.rendering.device_image import SumBuffers
         from cagefield.rendering.voxels import occupancy
-        from cagefield.rendering.voxels.device_grid import DeviceGrid, occupancy_args, to_device
+        from cagefield.rendering.voxels.device_grid import DeviceGrid, occupancy_args
 
         self.field = field
         self.edits: EditMap = edits if edits is not None else EditStack([])
@@ -96,9 +97,10 @@ class VoxelRenderer:
         coarse: bool = False,
         proceed: Callable[[], None] | None = None,
     ) -> None:
+        from cagefield.compute.device_buffers import for_kernels
         from cagefield.edits.device.packing import widened
         from cagefield.edits.device_stack import DeviceStack
-        from cagefield.rendering.voxels.device_grid import for_kernels, occupancy_args
+        from cagefield.rendering.voxels.device_grid import occupancy_args
         from cagefield.rendering.voxels.drag_occupancy import FixedEdits, replaced_place
         from cagefield.rendering.voxels.kernels.march import EmptySpaceArgs
         from cagefield.rendering.voxels.occupancy_deformed import Known, deform
@@ -193,7 +195,7 @@ class VoxelRenderer:
 
     def _device_directions(self, camera: Camera) -> Any:
         """The camera-space directions of a camera's pixels on the device; those of some sizes are kept."""
-        from cagefield.rendering.voxels.device_grid import to_device
+        from cagefield.compute.device_buffers import to_device
 
         local = camera.local_directions()
         if id(local) not in self._directions:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.rendering.voxels.device_grid import to_device
+from cagefield.compute.device_buffers import to_device
 
 SUMS_DECAY = 0.995
 """Decay of the sums per batch."""

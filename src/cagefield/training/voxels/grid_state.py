@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.compute import devices
+from cagefield.compute.device_buffers import to_device
 from cagefield.compute.devices import ints
 from cagefield.compute.quadrants import qd
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.rendering.voxels import occupancy
-from cagefield.rendering.voxels.device_grid import brick_order, to_device, transform_of
+from cagefield.rendering.voxels.device_grid import brick_order, transform_of
 from cagefield.rendering.voxels.kernels.grid import GridArgs
 from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs
 from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS

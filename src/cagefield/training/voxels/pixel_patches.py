@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.rendering.voxels.device_grid import to_device
+from cagefield.compute.device_buffers import to_device
 from cagefield.training.voxels.grid_state import GridState
 from cagefield.training.voxels.kernels.pixel_patches import touched_patches
 from cagefield.training.voxels.kernels.ray_batches import PatchArgs

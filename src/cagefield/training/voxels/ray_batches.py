@@ -53,7 +53,7 @@ class DevicePhotos:
         Raises:
             DatasetError: no view, or an unreadable photo.
         """
-        from cagefield.rendering.voxels.device_grid import to_device
+        from cagefield.compute.device_buffers import to_device
 
         if not views:
             raise DatasetError("no training photo: the data set is empty")

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera
 from cagefield.compute.block_cyclic import block_cyclic_schedule
+from cagefield.compute.device_buffers import to_device
 from cagefield.compute.devices import floats
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.rendering.voxels import occupancy
-from cagefield.rendering.voxels.device_grid import DeviceGrid, occupancy_args, to_device
+from cagefield.rendering.voxels.device_grid import DeviceGrid, occupancy_args
 from cagefield.training.voxels.kernels.vertex_visibility import mark_visible
 
 MIN_TRANSMITTANCE = 0.1
