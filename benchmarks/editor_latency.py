@@ -29,6 +29,7 @@ from playwright.sync_api import Page, sync_playwright
 
 import cagefield
 from benchmarks.common.machine import cpu_model
+from benchmarks.page_frames import GPU_FLAGS
 from cagefield.compute import devices
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
@@ -78,6 +79,8 @@ class EditorLatency:
     kinds: tuple[Kind, ...] = ("continuous", "discrete")
     empty_cache: bool = False
     """Start each repetition without compiled kernels."""
+    gpu: bool = False
+    """The page draws with the GPU by Vulkan, in place of software."""
     source: Path | None = None
     """Folder `src` of another version of cagefield, to compare with."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
@@ -109,7 +112,8 @@ class EditorLatency:
                 for number in range(DRAGS):
                     lines.append(row(f"{scene.name}, {kind}", number, [drags[number] for drags in runs]))
                     print(lines[-1], flush=True)
-        machine = f"{cpu_model()}, {devices.threads()} cores; page drawn in software, 1058x782"
+        drawn = "by the GPU" if self.gpu else "in software"
+        machine = f"{cpu_model()}, {devices.threads()} cores; page drawn {drawn}, 1058x782"
         command = "python -m benchmarks.editor_latency SCENE..." + (
             " --empty-cache" if self.empty_cache else ""
         )
@@ -136,7 +140,8 @@ class EditorLatency:
                 text=True,
                 env=environment,
             )
-            browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+            flags = GPU_FLAGS if self.gpu else FLAGS
+            browser = playwright.chromium.launch(executable_path=chromium, args=flags)
             try:
                 assert server.stdout is not None
                 link = re.search(r"http://\S+", server.stdout.readline())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -113,14 +113,19 @@ class FieldPage:
 
 
 @contextlib.contextmanager
-def field_page(splats: bool = False) -> Iterator[FieldPage]:
-    """A bare page with a renderer; skips where there is no Chromium. The page's errors fail the test."""
+def field_page(splats: bool = False, flags: Sequence[str] | None = None) -> Iterator[FieldPage]:
+    """A bare page with a renderer; skips where there is no Chromium. The page's errors fail the test.
+
+    flags: command line of Chromium; by default it draws in software.
+    """
     sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
     if CHROMIUM is None:
         pytest.skip("no chromium on this machine")
     complaints: list[str] = []
     with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        browser = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=list(FLAGS if flags is None else flags)
+        )
         page = browser.new_page(viewport={"width": 200, "height": 150})
         page.set_default_timeout(300_000)
         page.on("pageerror", lambda error: complaints.append(str(error)))

@@ -24,6 +24,11 @@ from cagefield.training.voxels.kernels.gauss_newton_voxels import (  # noqa: E40
     reduce_workers,
 )
 from cagefield.training.voxels.kernels.ray_batches import PatchArgs  # noqa: E402
+from cagefield.training.voxels.kernels.sample_lists import (  # noqa: E402
+    NOTE_FLOATS,
+    SampleListArgs,
+    gather_samples,
+)
 from cagefield.training.voxels.kernels.training_march import (  # noqa: E402
     MAX_SAMPLES,
     SAMPLE_FLOATS,
@@ -66,15 +71,28 @@ def state(degree: int, contracted: bool, workers: int = 2) -> GridState:
     return GridState.build(bounds, (N,) * 3, vertices, density, sh, contracted=contracted, threads=workers)
 
 
+def no_lists() -> SampleListArgs:
+    """Lists of samples without room."""
+    number, note = (to_device(np.zeros(1, kind)) for kind in (np.int32, np.float32))
+    return SampleListArgs(number, number, note, number, 0)
+
+
 def march(grid: GridState, data: DevicePhotos, gains: np.ndarray, distortion: float = 0.0) -> np.ndarray:
     """Runs one batch of all pixels; returns the losses of the rays."""
     return marched(grid, data, gains, distortion)[0]
 
 
 def marched(
-    grid: GridState, data: DevicePhotos, gains: np.ndarray, distortion: float = 0.0
+    grid: GridState,
+    data: DevicePhotos,
+    gains: np.ndarray,
+    distortion: float = 0.0,
+    lists: SampleListArgs | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Runs one batch of all pixels; returns the losses [R] and the squared colours [R,3] of the rays."""
+    """Runs one batch of all pixels; returns the losses [R] and the squared colours [R,3] of the rays.
+
+    With lists of samples as on a GPU.
+    """
     patches = data.patches(4)
     rays = len(patches) * 16
     losses, sums = to_device(np.zeros(rays, np.float32)), to_device(np.zeros(6 * rays, np.float32))
@@ -91,12 +109,36 @@ def marched(
         WorkerArgs(grid.accumulator, grid.record, scratch, grid.workers),
         LossArgs(losses, penalties, sums),
         BatchArgs(step, 0.05, distortion, 0.8, 7, 1, floats((1.0, 1.0, 1.0))),
+        no_lists() if lists is None else lists,
         grid.terms,
         grid.contracted,
-        False,
+        lists is not None,
     )
+    if lists is not None:
+        gather_samples(
+            lists, grid.accumulator, grid.vertex_at, grid.slots, ivec3(*grid.resolution), grid.terms
+        )
     squares = sums.to_numpy().astype(np.float64).reshape(rays, 6)[:, 3:]
     return 0.5 * losses.to_numpy().astype(np.float64) + penalties.to_numpy(), squares
+
+
+@pytest.mark.parametrize("room", [0, 100, 100_000])
+@pytest.mark.parametrize("contracted", [False, True])
+def test_samples_by_cell_add_up_as_those_of_workers(tmp_path, contracted, room):
+    """Without room for samples, with room for some, and for all."""
+    data, grid = photos(tmp_path), state(2, contracted, workers=1)
+    gains = np.ones((3, 3))
+    march(grid, data, gains, 0.5)
+    expected = grid.accumulator.to_numpy()
+    heads, links, count = (to_device(np.zeros(n, np.int32)) for n in (N**3, max(room, 1), 1))
+    notes = to_device(np.zeros(max(room, 1) * NOTE_FLOATS, np.float32))
+    lists = SampleListArgs(heads, links, notes, count, room)
+    for _ in range(2):  # the first batch leaves the lists empty
+        marched(grid, data, gains, 0.5, lists)
+        found = grid.accumulator.to_numpy()
+        np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5 * np.abs(expected).max())
+        assert not heads.to_numpy().any() and not count.to_numpy().any()
+    assert room in (0, 100) or np.count_nonzero(links.to_numpy()) > 100
 
 
 @pytest.mark.parametrize("contracted", [False, True])

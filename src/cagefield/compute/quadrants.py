@@ -59,7 +59,9 @@ def _own(array: Any) -> None:
 
 def _free(array: Any) -> None:
     """Stands for `Ndarray.__del__`; see above."""
-    program = impl.get_runtime()._prog if impl is not None and impl.get_runtime() is not None else None
+    # At the interpreter's end modules lose their names first.
+    is_over = impl is None or impl.get_runtime is None or impl.get_runtime() is None
+    program = None if is_over else impl.get_runtime()._prog
     if program is None or getattr(array, "arr", None) is None:
         return
     _collected.append((program, array.arr))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from cagefield.compute import devices
 from cagefield.compute.block_cyclic import block_cyclic_schedule
+from cagefield.compute.device_buffers import DeviceBuffers
 from cagefield.compute.devices import floats, ints
 from cagefield.compute.quadrants import qd
 from cagefield.training.voxels.exposure import Exposure
@@ -20,6 +21,7 @@ from cagefield.training.voxels.kernels.gauss_newton_voxels import (
     reduce_workers,
 )
 from cagefield.training.voxels.kernels.ray_batches import PatchArgs
+from cagefield.training.voxels.kernels.sample_lists import NOTE_FLOATS, SampleListArgs, gather_samples
 from cagefield.training.voxels.kernels.training_march import (
     MAX_SAMPLES,
     SAMPLE_FLOATS,
@@ -36,6 +38,9 @@ from cagefield.training.voxels.voxel_space import VoxelSpace
 MAX_GPU_RAYS = 1 << 15
 """Maximum number of rays that a GPU marches at once; the noted samples of a ray take 16 kB."""
 
+LISTED_SAMPLES_PER_RAY = 48
+"""Samples of a batch that are listed by cell on a GPU, on average per ray; a listed sample takes 68 bytes."""
+
 
 class BatchTrainer:
     """Trains a grid on batches of pixel patches; owns the device buffers that the batches share."""
@@ -46,6 +51,8 @@ class BatchTrainer:
         self._config, self._settings, self._photos, self._space = config, settings, photos, space
         self._buffers: dict[int, tuple[Any, Any, Any, Any]] = {}
         self._notes: tuple[int, Any] | None = None
+        self._memory = DeviceBuffers()
+        self._emptied: Any = None
 
     def train(
         self, grid: GridState, patches: NDArray[np.int32], exposure: Exposure, step: int, done: float
@@ -75,6 +82,7 @@ class BatchTrainer:
         patches.from_numpy(np.ascontiguousarray(selected).reshape(-1))
         cells = grid.args
         step = config.step_voxels if space.contracted else config.step_voxels / float(np.max(cells.scale))
+        lists = self._sample_lists(grid, count * config.patch_size**2 if gpu else 0)
         march_batch(
             block_cyclic_schedule(workers, 1),
             PatchArgs(patches, count, config.patch_size),
@@ -92,10 +100,15 @@ class BatchTrainer:
                 1,
                 floats((1.0, 1.0, 1.0)),
             ),
+            lists,
             grid.terms,
             space.contracted,
             gpu,
         )
+        if gpu:
+            gather_samples(
+                lists, grid.accumulator, grid.vertex_at, grid.slots, ints(grid.resolution), grid.terms
+            )
         return losses, sums
 
     def _add_laplacian(self, grid: GridState) -> None:
@@ -151,6 +164,20 @@ class BatchTrainer:
                 )
             }
         return self._buffers[count]
+
+    def _sample_lists(self, grid: GridState, rays: int) -> SampleListArgs:
+        """Empty lists of the samples of `rays` rays by cell."""
+        room = LISTED_SAMPLES_PER_RAY * rays
+        vertices = int(np.prod(grid.resolution)) if rays else 1
+        heads = self._memory.exact("heads", vertices, np.int32)
+        count = self._memory.exact("count", 1, np.int32)
+        if self._emptied is not heads:
+            # A batch leaves them empty.
+            heads.fill(0)
+            count.fill(0)
+            self._emptied = heads
+        links = self._memory.take("links", room, np.int32)
+        return SampleListArgs(heads, links, self._memory.take("notes", NOTE_FLOATS * room), count, room)
 
     def _sample_scratch(self, workers: int) -> Any:
         """Device buffer for the samples of `workers` rays."""

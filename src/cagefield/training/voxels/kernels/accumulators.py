@@ -2,8 +2,8 @@
 
 A record has HEADER_FLOATS + 3K floats: density gradient, density curvature sum_c (dC_c/ds)^2, color curvature
 w^2, maximum weight, then the 3K color gradients (basis-major). On a CPU each worker adds to its own
-accumulator, without atomics, so the sums do not depend on timing; on a GPU all workers share one accumulator
-with atomic adds.
+accumulator, without atomics, so the sums do not depend on timing; on a GPU all workers share one accumulator,
+to which vertices add the samples around them (`kernels.sample_lists`), or workers by atomic adds.
 """
 
 from cagefield.compute.quadrants import qd
@@ -19,3 +19,12 @@ def add(target: qd.template(), at: qd.i32, value: qd.f32, gpu: qd.template()):
         qd.atomic_add(target[at], value)
     else:
         target[at] = target[at] + value
+
+
+@qd.func
+def add_max(target: qd.template(), at: qd.i32, value: qd.f32, gpu: qd.template()):
+    """target[at] = max(target[at], value), atomically on a GPU only."""
+    if qd.static(gpu):
+        qd.atomic_max(target[at], value)
+    else:
+        target[at] = qd.max(target[at], value)

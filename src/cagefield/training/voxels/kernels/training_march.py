@@ -37,8 +37,9 @@ from cagefield.rendering.voxels.kernels.grid import (
     vec3,
 )
 from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs, look_ahead, safe_inverse, slab
-from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS, add
+from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS, add, add_max
 from cagefield.training.voxels.kernels.ray_batches import PatchArgs, PhotoArgs
+from cagefield.training.voxels.kernels.sample_lists import SampleListArgs, note_sample
 
 SAMPLE_FLOATS = 8
 """Floats of a noted sample: t, h, w, T after it, color before the clamp, and distortion slope u."""
@@ -114,11 +115,15 @@ def march_batch(
     work: WorkerArgs,
     loss: LossArgs,
     batch: BatchArgs,
+    lists: SampleListArgs,
     K: qd.template(),
     contracted: qd.template(),
     gpu: qd.template(),
 ):
-    """Add the gradients and curvatures of a batch of patches to the accumulators, and write `loss`."""
+    """Add the gradients and curvatures of a batch of patches to the accumulators, and write `loss`.
+
+    On a GPU samples go to the lists, as many as these have room for.
+    """
     rays = patches.size * patches.size
     total = patches.count * rays
     # A CPU worker takes consecutive patches; neighboring GPU threads take neighboring rays.
@@ -275,6 +280,9 @@ def march_batch(
                                 )
                         slopes *= gain
 
+                    noted = 0
+                    if qd.static(gpu):
+                        noted = qd.atomic_add(lists.count[0], samples)
                     remaining = C
                     for sample in range(samples):
                         at = SAMPLE_FLOATS * (worker * MAX_SAMPLES + sample)
@@ -314,19 +322,29 @@ def march_batch(
                                 pull[a] = 0.0
                             if color[a] > 1.0 and pull[a] < 0.0:
                                 pull[a] = 0.0
-                        for k in qd.static(range(8)):
-                            if slots[k] > 0:
-                                to = base + slots[k] * (HEADER_FLOATS + 3 * K)
-                                add(work.accumulator, to, b[k] * gradient, gpu)
-                                add(work.accumulator, to + 1, b[k] * curvature, gpu)
-                                add(work.accumulator, to + 2, b[k] * color_curvature, gpu)
-                                if qd.static(gpu):
-                                    qd.atomic_max(work.accumulator[to + 3], b[k] * w)
-                                else:
-                                    work.accumulator[to + 3] = qd.max(work.accumulator[to + 3], b[k] * w)
-                                for j in qd.static(range(K)):
-                                    y = b[k] * basis[j]
-                                    for a in qd.static(range(3)):
-                                        add(
-                                            work.accumulator, to + HEADER_FLOATS + 3 * j + a, y * pull[a], gpu
-                                        )
+                        listed = 0
+                        if qd.static(gpu):
+                            if noted + sample < lists.room:
+                                listed = 1
+                                note_sample(
+                                    lists,
+                                    noted + sample,
+                                    (cell.x * grid.resolution.y + cell.y) * grid.resolution.z + cell.z,
+                                    g - qd.cast(cell, qd.f32),
+                                    qd.Vector([gradient, curvature, color_curvature, w]),
+                                    pull,
+                                    d,
+                                )
+                        if listed == 0:
+                            for k in qd.static(range(8)):
+                                if slots[k] > 0:
+                                    to = base + slots[k] * (HEADER_FLOATS + 3 * K)
+                                    add(work.accumulator, to, b[k] * gradient, gpu)
+                                    add(work.accumulator, to + 1, b[k] * curvature, gpu)
+                                    add(work.accumulator, to + 2, b[k] * color_curvature, gpu)
+                                    add_max(work.accumulator, to + 3, b[k] * w, gpu)
+                                    for j in qd.static(range(K)):
+                                        y = b[k] * basis[j]
+                                        for a in qd.static(range(3)):
+                                            c_to = to + HEADER_FLOATS + 3 * j + a
+                                            add(work.accumulator, c_to, y * pull[a], gpu)
