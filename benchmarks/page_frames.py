@@ -33,6 +33,8 @@ from cagefield.pages.page_field import encode_page_field
 from cagefield.pages.page_splat_edits import encode_page_splat_edits
 from cagefield.pages.page_splats import encode_page_splats
 from cagefield.rendering.renderers import renderer_of
+from cagefield.rendering.splats.raster_splats import changed_splats
+from cagefield.rendering.splats.splitting import split_of
 from cagefield.scene.scene import Scene
 from field_page import FieldPage, field_page
 
@@ -107,7 +109,9 @@ def drag_ms(page: FieldPage, scene: Scene, camera: Camera, moves: int = 5) -> fl
 def encoded(renderer: Any, scene: Scene) -> bytes:
     """The edits of a renderer as pages read them."""
     if isinstance(scene.field, SplatField):
-        return encode_page_splat_edits(renderer)
+        edits = renderer.edits
+        changed = changed_splats(scene.field, edits, split=split_of(scene.field, edits))
+        return encode_page_splat_edits(scene.field, changed)
     return encode_page_edits(renderer)
 
 
@@ -128,8 +132,7 @@ def rows_of(path: Path, frames: int, flags: Sequence[str] | None) -> tuple[list[
             plain = frame_ms(page, camera, frames)
             page.edit(edited)
             changed = frame_ms(page, camera, frames)
-            drag = "" if splats else number(drag_ms(page, scene, camera), 0)
-            page.edit(None)
+            drag = number(drag_ms(page, scene, camera), 0)
             rows.append(
                 (
                     path.name,

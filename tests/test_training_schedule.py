@@ -40,6 +40,16 @@ def test_the_resolution_grows_with_the_root_of_the_time_and_of_the_threads():
     assert chosen(VoxelConfig(minutes=0.5), 800, threads=8).resolution == pytest.approx(2 * short, abs=12)
 
 
+def test_the_laplacian_grows_with_the_rays_of_a_batch():
+    for unbounded in (False, True):
+        cpu = chosen(VoxelConfig(minutes=1.0), 400, unbounded=unbounded)
+        gpu = chosen(VoxelConfig(minutes=1.0), 400, threads=None, unbounded=unbounded)
+        few = chosen(VoxelConfig(steps=10, batch_rays=1024), 400, unbounded=unbounded)
+        assert gpu.laplacian_reg / gpu.batch_rays == pytest.approx(cpu.laplacian_reg / cpu.batch_rays)
+        assert few.laplacian_reg == pytest.approx(cpu.laplacian_reg / 4)
+    assert chosen(VoxelConfig(laplacian_reg=1e-4, batch_rays=1024), 400).laplacian_reg == 1e-4
+
+
 def test_a_run_of_given_steps_chooses_the_same_on_every_machine():
     found = {chosen(VoxelConfig(steps=4000), 800, threads) for threads in (1, 2, 64, None)}
     assert len(found) == 1

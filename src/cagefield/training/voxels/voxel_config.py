@@ -40,7 +40,8 @@ class VoxelConfig:
         damping: constant added to every curvature.
         max_step: maximum change of a voxel's optical depth in one step.
         laplacian_reg: weight of the Laplacian regularization; None takes 1e-5, or 1e-3 for an unbounded
-            capture.
+            capture, for a batch of 4096 rays, and in proportion for others: a batch has one Laplacian, and
+            evidence in proportion to its rays.
         view_dependence_reg: weight of the penalty on view-dependent color coefficients, relative to the
             evidence of the photos; colors seen from one side alone then extrapolate to the other sides. None
             takes 3e-3, or 2e-2 for an unbounded capture.

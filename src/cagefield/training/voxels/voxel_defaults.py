@@ -59,6 +59,9 @@ def resolve_settings(
             bounded_resolution(sizes, expected_rays(config, threads)), 2, (8.0, 2.0), 1e-5, 3e-3, batch
         )
     )
+    defaults = dataclasses.replace(
+        defaults, laplacian_reg=defaults.laplacian_reg * (config.batch_rays or batch) / BATCH_RAYS
+    )
     given = {field.name: getattr(config, field.name) for field in dataclasses.fields(VoxelSettings)}
     return dataclasses.replace(
         defaults, **{name: value for name, value in given.items() if value is not None}
