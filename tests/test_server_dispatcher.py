@@ -72,6 +72,7 @@ class PlayedDispatcher:
         self.delivered: list[int] = []
         self.notices: list[str] = []
         self.background: list[BackgroundTask] = []
+        self.rests: list[bool] = []
 
     def picture_task(self, request: Request, generation: int) -> tuple[PictureTask, Stamp]:
         task = PictureTask(
@@ -95,7 +96,8 @@ class PlayedDispatcher:
     def notice(self, level: str, text: str) -> None:
         self.notices.append(text)
 
-    def background_task(self) -> BackgroundTask | None:
+    def background_task(self, rested: bool) -> BackgroundTask | None:
+        self.rests.append(rested)
         return self.background.pop(0) if self.background else None
 
 
@@ -190,6 +192,27 @@ def test_chores_wait_until_no_page_does(source: PlayedDispatcher, monkeypatch: p
         worker.answer(Stopped(background_task.number))
         await settle()
         assert results == [Stopped(background_task.number)]
+
+    play(source, monkeypatch, script)
+
+
+def test_long_background_tasks_wait_for_a_rest(
+    source: PlayedDispatcher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A timer asks for them; a task that a caller waits for begins the rest anew."""
+    monkeypatch.setattr(module, "REST_SECONDS", 0.2)
+
+    async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
+        assert source.rests == [False]
+        await asyncio.sleep(0.3)
+        assert source.rests[-1]
+        asked = asyncio.ensure_future(dispatcher.ask(surface))
+        await settle()
+        worker.answer(Answered(worker.tasks[-1].number, "point"))
+        await settle()
+        assert await asked == "point" and not source.rests[-1]
+        await asyncio.sleep(0.3)
+        assert source.rests[-1]
 
     play(source, monkeypatch, script)
 

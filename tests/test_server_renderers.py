@@ -292,6 +292,15 @@ def test_light_is_found_once_a_cage_needs_it_and_again_where_it_was_cancelled() 
     assert background.next(3) is None
 
 
+def test_light_is_found_before_the_first_cage_while_there_is_time() -> None:
+    session: Any = SimpleNamespace(moving=False, drawn=lambda: ())
+    background = BackgroundWork(session, Any, lambda: None, lambda _: None)  # type: ignore[arg-type]
+    background.warming = []
+    assert background.next(0) is None
+    light = background.next(1, expects_edits=True)
+    assert light is not None and light.make(1) == LightTask(1, 1)
+
+
 def test_jobs_write_pictures_and_a_video_that_is_there_when_it_is_whole(
     renderers: RendererCache, tmp_path: Path
 ) -> None:

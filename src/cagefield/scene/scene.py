@@ -36,6 +36,7 @@ from numpy.typing import ArrayLike, NDArray
 from cagefield.cameras.camera import Camera
 from cagefield.cameras.camera_paths import shared_up
 from cagefield.completion.pasting.paste_content import content_box
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.edits import EditStack, LatticeError, Paste, PreparedStack
 from cagefield.edits.edit_files import dump_edits, load_edits
 from cagefield.edits.paste_paths import rebased
@@ -434,7 +435,7 @@ class Scene:
         plain = cache(lambda: renderer_of(self.rendered_field))
 
         def render(camera: Camera) -> RenderResult:
-            return plain().render(camera, background="black", normals=True)
+            return plain().render(camera, background="black", normals=True, proceed=check_cancelled)
 
         cameras = self.cameras.get("train", ())
         return Patcher(self.rendered_field, cameras, render, PasteLoader(self.sources))

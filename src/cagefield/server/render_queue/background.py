@@ -1,7 +1,7 @@
 """Background tasks of the rendering process, for times when no page waits for an image.
 
-It makes its kernels ready, finds the light of the field as soon as there is a cage, so that no edit waits for
-it, measures the lattices of edits, and renders the pictures of background jobs.
+It makes its kernels ready, finds the light of the field, so that no edit waits for it, as soon as there is a cage
+or while no page asks for anything, measures the lattices of edits, and renders the pictures of background jobs.
 """
 
 from __future__ import annotations
@@ -56,11 +56,15 @@ class BackgroundWork:
         self._numbers = 0
         self.exports = Exports(session, store, tell)
 
-    def next(self, generation: int) -> BackgroundTask | None:
-        """Next background task, or None; tasks of older generations than `generation` are abandoned."""
+    def next(self, generation: int, expects_edits: bool = False) -> BackgroundTask | None:
+        """Next background task, or None; tasks of older generations than `generation` are abandoned.
+
+        `expects_edits` where an edit may follow and there is time to find the light for it.
+        """
         if self.warming:
             return self._warm()
-        if not self.light_known and any(edit.relight != "none" for edit in self._session.drawn()):
+        needs_light = any(edit.relight != "none" for edit in self._session.drawn())
+        if not self.light_known and (needs_light or expects_edits):
             return BackgroundTask(lambda number: LightTask(number, generation), self._light_done)
         edit = self._unmeasured()
         if edit is not None:

@@ -49,6 +49,7 @@ class Page:
     """An open page: its camera and view, and its outgoing messages."""
 
     number: int
+    read_only: bool = False
     send_queue: SendQueue = field(default_factory=SendQueue)
     camera: Camera | None = None
     display: Display = field(default_factory=Display)
@@ -112,7 +113,7 @@ class Coordinator:
     def join(self, hello: server_messages.Hello) -> Page:
         """A new page; it is sent the scene, the edits and the jobs."""
         self._pages += 1
-        page = Page(self._pages)
+        page = Page(self._pages, hello.read_only)
         self.pages[page.number] = page
         self.dispatcher.scheduler.join(page.number)
         page.send_queue.put(hello.model_copy(update={"page": page.number}))
@@ -306,10 +307,11 @@ class Coordinator:
             page.has = done.keys if isinstance(done, EditsDone) else ()
             page.send_queue.put_picture(edits_message(request, stamp, done))
 
-    def background_task(self) -> BackgroundTask | None:
-        """Next background task while no page waits for an image, or None."""
+    def background_task(self, rested: bool) -> BackgroundTask | None:
+        """Next background task while no page waits for an image, or None; `rested` for REST_SECONDS."""
         generation = self.dispatcher.scheduler.generation
-        return self.highlights.next(generation) or self.background.next(generation)
+        may_edit = any(not page.read_only for page in self.pages.values())
+        return self.highlights.next(generation) or self.background.next(generation, rested and may_edit)
 
     def _numbered_shown(self) -> tuple[int, Shown]:
         """Number of the pictures' revision, and its content."""

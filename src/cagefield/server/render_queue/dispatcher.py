@@ -40,6 +40,9 @@ RESTARTS = 3
 
 _GIVEN_UP = "the renderer ends again and again (out of memory?); save your edits and restart the editor"
 
+REST_SECONDS = 2.0
+"""Time without a task that a page or a caller waits for after which a background task may be a long one."""
+
 PATIENT = 4
 """Tasks that wait until no page does, at most."""
 
@@ -92,8 +95,8 @@ class TaskSource(Protocol):
     def replaced(self) -> None:
         """The scene's folder holds another scene, but pictures are of the one that was opened."""
 
-    def background_task(self) -> BackgroundTask | None:
-        """Next background task while no page waits for an image, or None."""
+    def background_task(self, rested: bool) -> BackgroundTask | None:
+        """Next background task while no page waits for an image, or None; `rested` for REST_SECONDS."""
 
 
 @dataclass
@@ -123,6 +126,8 @@ class Dispatcher:
         """Of `_patient` the one that is being done."""
         self._numbers = 0
         self._wake: asyncio.TimerHandle | None = None
+        self._busy = time.monotonic()
+        """When a task that somebody waits for was last handed on or done."""
         self._losses: list[float] = []
 
     def start(self) -> None:
@@ -211,7 +216,9 @@ class Dispatcher:
             return
         running = self._next(now)
         if running is None:
-            self._sleep(self.scheduler.wake(now))
+            rest = self._busy + REST_SECONDS - now if self.scheduler.idle() else 0.0
+            waits = [wait for wait in (self.scheduler.wake(now), rest) if wait is not None]
+            self._sleep(min((wait for wait in waits if wait > 0.0), default=None))
             return
         self._running = running
         self.worker.send(running.task)
@@ -222,6 +229,21 @@ class Dispatcher:
             self.scheduler.generation += 1
 
     def _next(self, now: float) -> _Running | None:
+        awaited = self._awaited(now)
+        if awaited is not None:
+            self._busy = now
+            return awaited
+        if not self.scheduler.idle():
+            return None
+        background_task = self._source.background_task(now - self._busy >= REST_SECONDS)
+        return (
+            None
+            if background_task is None
+            else _Running(background_task.make(self._number()), done=background_task.done)
+        )
+
+    def _awaited(self, now: float) -> _Running | None:
+        """Next task that a caller or a page waits for."""
         if self._queue:
             return self._queue.popleft()
         request = self.scheduler.next(now)
@@ -231,17 +253,7 @@ class Dispatcher:
         if request is not None:
             task, stamp = self._source.picture_task(request, self.scheduler.generation)
             return _Running(task, request, stamp)
-        if not self.scheduler.idle():
-            return None
-        patient = self._patient_task()
-        if patient is not None:
-            return patient
-        background_task = self._source.background_task()
-        return (
-            None
-            if background_task is None
-            else _Running(background_task.make(self._number()), done=background_task.done)
-        )
+        return self._patient_task() if self.scheduler.idle() else None
 
     def _number(self) -> int:
         """Numbers of tasks that are no pictures; those have the scheduler's."""
@@ -274,6 +286,7 @@ class Dispatcher:
         request = running.request
         if request is None or running.stamp is None:
             return
+        self._busy = time.monotonic()
         if isinstance(request, EditsRequest):
             if isinstance(result, (EditsDone, Failed)):
                 self.scheduler.sent(request, result.refinement if isinstance(result, EditsDone) else FINAL)
