@@ -13,6 +13,7 @@ from .errors import CagefieldError as CagefieldError
 from .fields.baking import bake as bake
 from .fields.nerf_field import NerfField as NerfField
 from .fields.protocol import Field as Field
+from .fields.splat_decimation import decimate_splats as decimate_splats
 from .fields.splat_field import SplatField as SplatField
 from .fields.voxel_field import VoxelField as VoxelField
 from .formats.splats.splat_files import read_splats as read_splats

@@ -5,6 +5,7 @@ from .analytic import UniformSphere as UniformSphere
 from .baking import bake as bake
 from .nerf_field import NerfField as NerfField
 from .protocol import Field as Field
+from .splat_decimation import decimate_splats as decimate_splats
 from .splat_field import SplatField as SplatField
 from .splat_mixture import SplatMixture as SplatMixture
 from .voxel_field import VoxelField as VoxelField
