@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import sys
 import tempfile
 from pathlib import Path
 
@@ -33,7 +34,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Tells the pages who draws, kernels to run on the CPU unless CAGEFIELD_DEVICE names another device, and
-    threads not to spin while they wait. What fills edits is kept in a cache of this run's own.
+    threads not to spin while they wait. Patches of edits are kept in a cache of this run's own, and bytecode
+    too where PYTHONDONTWRITEBYTECODE keeps it out of the source tree: hundreds of test processes would compile
+    all modules that they import.
 
     Test processes share the cores: threads that spin take them from the other processes, whose threads spin
     too, and small networks and products of small matrices then take five to twenty times as long. Libraries
@@ -44,6 +47,9 @@ def pytest_configure(config: pytest.Config) -> None:
         own = Path(tempfile.mkdtemp(prefix="cagefield-tests-"))
         cache_of_its_own(own)
         os.environ["XDG_CACHE_HOME"] = str(own)
+        if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
+            os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix = str(own / "bytecode")
+            sys.dont_write_bytecode = False
         config.add_cleanup(lambda: shutil.rmtree(own, ignore_errors=True))
     os.environ.setdefault("CAGEFIELD_DEVICE", "cpu")
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
