@@ -16,7 +16,7 @@ from cagefield.procedural import make_scene
 from commands import refused
 from scenes import ball_scene, files_of
 
-QUICK = ("--steps", "60", "--resolution", "48")
+QUICK = ("--steps", "60", "--resolution", "48", "--sh-degree", "1")
 
 
 @pytest.fixture(scope="module")
