@@ -33,6 +33,12 @@ def test_long_files_come_first_and_the_order_within_files_stays() -> None:
     assert unit_of(ids[4]) == unit_of(ids[5]) != unit_of(ids[3]) == "tests/robustness/test_files.py"
 
 
+def test_processes_of_tests_keep_bytecode() -> None:
+    """Also where PYTHONDONTWRITEBYTECODE is set for the whole run."""
+    command = [sys.executable, "-c", "import sys; print(sys.dont_write_bytecode)"]
+    assert subprocess.run(command, capture_output=True, text=True).stdout.split() == ["False"]
+
+
 def test_files_of_a_family_run_in_one_process(tmp_path: Path) -> None:
     """As many tests as let both processes take files, each of which notes its process."""
     pytest.importorskip("xdist", reason="pytest-xdist is not installed")
