@@ -75,7 +75,7 @@ def test_train_refuses_before_it_trains(
         ("--downscale", 0, "downscale"),
     ):
         assert message in refused(capsys, "train", photos, "-o", tmp_path / "new", option, value)
-    assert "no checkpoint" in refused(capsys, "train", photos, "-o", tmp_path / "new", *TRAIN_QUICK, "--resume")
+    assert "no checkpoint" in refused(capsys, "train", photos, "-o", tmp_path / "new", *QUICK, "--resume")
     assert files_of(tmp_path) == before and not (tmp_path / "new").exists()
 
 
