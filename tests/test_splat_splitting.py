@@ -73,7 +73,7 @@ def test_split_splats_follow_the_edit_more_closely(name: str, monkeypatch: pytes
         return renderer.render(CAMERA, background="black").rgb
 
     whole, split = shown(field), shown(split_for_edits(field, edits).field)
-    monkeypatch.setattr(splitting, "BEND", 0.04)
+    monkeypatch.setattr(split_children, "BEND", 0.04)
     monkeypatch.setattr(splitting, "ROUNDS", 6)
     fine = shown(split_for_edits(dataclasses.replace(field), edits).field)
     assert psnr(split, fine) > psnr(whole, fine) + 1.0
