@@ -6,9 +6,11 @@ Markers by file: `browser`, `train` and `robust`, for the quick tier of contribu
 
 from __future__ import annotations
 
+import gc
 import os
 import re
 import shutil
+import sys
 import tempfile
 from pathlib import Path
 
@@ -19,6 +21,7 @@ from cagefield import Scene, load_dataset
 from cagefield.procedural import make_scene
 from cagefield.training.voxels.train_voxels import train_voxel
 from cagefield.training.voxels.voxel_config import VoxelConfig
+from distribution import long_first, pytest_xdist_make_scheduler  # noqa: F401
 from own_cache import cache_of_its_own
 
 
@@ -33,7 +36,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Tells the pages who draws, kernels to run on the CPU unless CAGEFIELD_DEVICE names another device, and
-    threads not to spin while they wait. What fills edits is kept in a cache of this run's own.
+    threads not to spin while they wait. Patches of edits are kept in a cache of this run's own; bytecode
+    too, where PYTHONDONTWRITEBYTECODE keeps it out of the source tree: hundreds of processes would compile
+    all modules that they import.
 
     Test processes share the cores: threads that spin take them from the other processes, whose threads spin
     too, and small networks and products of small matrices then take five to twenty times as long. Libraries
@@ -44,12 +49,16 @@ def pytest_configure(config: pytest.Config) -> None:
         own = Path(tempfile.mkdtemp(prefix="cagefield-tests-"))
         cache_of_its_own(own)
         os.environ["XDG_CACHE_HOME"] = str(own)
+        if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
+            os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix = str(own / "bytecode")
+            sys.dont_write_bytecode = False
         config.add_cleanup(lambda: shutil.rmtree(own, ignore_errors=True))
     os.environ.setdefault("CAGEFIELD_DEVICE", "cpu")
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if config.getoption("--page-renderer"):
         editor_page.DRAWN_BY = "page"
+    config.option.loadscopereorder = False  # the order is that of `long_first`
 
 
 _MARKERS = {
@@ -62,11 +71,19 @@ _MARKERS = {
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Adds the markers of `_MARKERS`."""
+    """Adds the markers of `_MARKERS`; in processes of `pytest -n`, orders tests by `long_first`."""
     for item in items:
         for marker, pattern in _MARKERS.items():
             if re.search(pattern, item.path.as_posix()):
                 item.add_marker(marker)
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        items[:] = [items[index] for index in long_first(item.nodeid for item in items)]
+
+
+def pytest_collection_finish() -> None:
+    """Takes modules and tests, over half a million objects, out of Python's later searches for garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

@@ -352,6 +352,7 @@ def test_a_pixel_is_the_mean_of_its_rays() -> None:
     )
 
 
+@pytest.mark.nightly
 def test_pictures(bench: Workbench, tmp_path: Path) -> None:
     one = case("microphone", "delete_base")
     path = write_picture(one, bench, tmp_path, 24)
@@ -475,6 +476,7 @@ def test_frame_times() -> None:
 # -- training curves ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_curve_is_taken_on_the_way_to_the_same_field(bench: Workbench) -> None:
     dataset = bench.photos("microphone")
     curve = training_curves.measure(dataset, TINY.config, views=2, shares=(0.2, 0.6))
@@ -504,6 +506,7 @@ def test_curves_refuse_what_they_cannot_measure(bench: Workbench) -> None:
 # -- commands ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_bench_speed_writes_json_and_markdown(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     ball_scene().save(tmp_path / "scene")
     argv = ["bench", "speed", str(tmp_path / "scene"), "--size", "24x16", "--rounds", "1", "--cameras", "1"]
@@ -541,6 +544,7 @@ def test_bench_edits_refuses_before_it_works(capsys: pytest.CaptureFixture[str],
     assert files_of(tmp_path) == before
 
 
+@pytest.mark.nightly
 def test_bench_edits_writes_table_and_pictures(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, bench: Workbench
 ) -> None:
@@ -569,6 +573,7 @@ def test_bench_training_refuses(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     assert files_of(tmp_path) == {"curve.md": b"mine"}
 
 
+@pytest.mark.nightly
 def test_bench_training_writes_curve_and_scene(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, bench: Workbench
 ) -> None:

@@ -37,7 +37,7 @@ from cagefield.procedural.variations import (
 )
 from commands import printed, refused
 
-VIEWS, SIZE = 17, 64
+VIEWS, SIZE = 17, 48
 TRAINING = [index % 8 != 0 for index in range(VIEWS)]
 
 

@@ -34,6 +34,12 @@ def room(tmp_path_factory):
     return make_capture("room-digger", tmp_path_factory.mktemp("captures") / "room", views=16, size=160)
 
 
+@pytest.fixture(scope="module")
+def short_room(tmp_path_factory):
+    """Seven photos to train with, and two to test."""
+    return make_capture("room-digger", tmp_path_factory.mktemp("captures") / "room", views=9, size=160)
+
+
 @cache
 def taken(case: Case | None, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """The digger's room, edited by hand, from a camera: (rgb, distance)."""
@@ -77,6 +83,7 @@ def test_the_scene_itself_has_no_depth_error_and_no_fog(room):
     assert score.points.rays >= 10 and score.points.median < 0.02 and score.points.fog == 0.0
 
 
+@pytest.mark.nightly
 def test_depth_errors_fog_and_exposures_are_what_they_are_made(room):
     data = load_dataset(room)
     points = sighted_points(data)
@@ -92,8 +99,8 @@ def test_depth_errors_fog_and_exposures_are_what_they_are_made(room):
     assert captures.measure(data, exact(), None).points.rays == 0
 
 
-def test_points_that_held_out_photos_alone_see_are_not_trained_with(room):
-    data = load_dataset(room)
+def test_points_that_held_out_photos_alone_see_are_not_trained_with(short_room):
+    data = load_dataset(short_room)
     train, test = [v.name for v in data.train], [v.name for v in data.test]
     sets = (frozenset(test), frozenset([*test, train[0]]), frozenset(train[:2]), frozenset([*train, *test]))
     points = SparsePoints(np.arange(12.0).reshape(4, 3), np.zeros((4, 3), np.uint8), sets)
@@ -103,21 +110,21 @@ def test_points_that_held_out_photos_alone_see_are_not_trained_with(room):
     assert for_training(data, None) is data
 
 
-def test_sightings_of_the_colmap_model_beside_a_transforms_file_are_found(room):
+def test_sightings_of_the_colmap_model_beside_a_transforms_file_are_found(short_room):
     pytest.importorskip("pycolmap")
-    data = load_dataset(room)
+    data = load_dataset(short_room)
     assert data.points is not None and not data.points.seen_by
     points = sighted_points(data)
     assert points is not None
     np.testing.assert_allclose(points.positions, data.points.positions, atol=1e-5)
     names = {view.name for view in (*data.train, *data.test)}
     assert all(len(those) >= 3 and those <= names for those in points.seen_by)
-    model = load_dataset(room / "colmap/sparse/0/cameras.txt")
+    model = load_dataset(short_room / "colmap/sparse/0/cameras.txt")
     assert sighted_points(model) is model.points
 
 
-def test_the_true_depth_follows_the_photo_when_it_is_shrunk(room):
-    whole, half = load_dataset(room), load_dataset(room, downscale=2)
+def test_the_true_depth_follows_the_photo_when_it_is_shrunk(short_room):
+    whole, half = load_dataset(short_room), load_dataset(short_room, downscale=2)
     large, small = (captures.true_depth(data, data.test[0]) for data in (whole, half))
     assert large is not None and small is not None and small.shape == (80, 45)
     np.testing.assert_array_equal(small, large[1::2, 1::2])
@@ -142,8 +149,8 @@ def test_sampled_opacity_is_beers_law():
     np.testing.assert_allclose(many.reshape(-1, 2), np.tile(found, (3000, 1)), atol=1e-12)
 
 
-def test_unknown_fields_and_captures_without_held_out_photos_are_refused(room):
-    data = load_dataset(room)
+def test_unknown_fields_and_captures_without_held_out_photos_are_refused(short_room):
+    data = load_dataset(short_room)
     with pytest.raises(CagefieldError, match="fields of captures are splat, voxel, not 'mesh'"):
         learn(data, "mesh", Budget(), print)
     with pytest.raises(CagefieldError, match="no held-out photos"):
@@ -170,14 +177,14 @@ def test_the_table_has_a_row_for_each_score_and_dashes_for_what_is_not_known():
     assert cells[10:15] == ["-"] * 5
 
 
-def test_photos_that_are_in_no_split_are_counted(room, tmp_path):
-    for view in load_dataset(room).train[:3]:
+def test_photos_that_are_in_no_split_are_counted(short_room, tmp_path):
+    for view in load_dataset(short_room).train[:3]:
         shutil.copy(view.image_path, tmp_path)
     views = [
         dataclasses.replace(view, image_path=tmp_path / Path(view.name).name)
-        for view in load_dataset(room).train[:2]
+        for view in load_dataset(short_room).train[:2]
     ]
-    data = dataclasses.replace(load_dataset(room), train=(views[0],), test=(views[1],), val=())
+    data = dataclasses.replace(load_dataset(short_room), train=(views[0],), test=(views[1],), val=())
     assert captures.left_out_photos(data) == 1
     for name in ("r_0_depth_0001.png", "dynamic_mask_0.png", ".hidden.jpg", "notes.txt", "hidden-part.png"):
         (tmp_path / name).write_bytes(b"")
@@ -188,9 +195,9 @@ def test_photos_that_are_in_no_split_are_counted(room, tmp_path):
     assert captures.left_out_photos(data) == 2
 
 
-def test_figures_leave_out_what_a_mask_excludes(room, tmp_path):
+def test_figures_leave_out_what_a_mask_excludes(short_room, tmp_path):
     """A square of each test photo is painted black and masked: figures are those of the other pixels."""
-    data = load_dataset(room)
+    data = load_dataset(short_room)
     tests = []
     for view in data.test:
         photo, mask = view.load(), np.full((160, 90), 255, np.uint8)
@@ -301,6 +308,7 @@ def test_the_edits_of_rooms_are_what_their_cases_say():
         assert (others > 0).all()
 
 
+@pytest.mark.nightly
 def test_pictures_of_a_rooms_edit_are_as_trained_edited_and_the_truth(tmp_path):
     case = ROOM_CASES[1]
     path = room_edits.write_picture(exact(gain=0.8), case, tmp_path, 120)

@@ -17,6 +17,7 @@ from commands import refused
 from scenes import ball_scene, files_of
 
 QUICK = ("--steps", "60", "--resolution", "48")
+TRAIN_QUICK = (*QUICK, "--sh-degree", "1")
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +28,7 @@ def photos(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_train_writes_a_scene(photos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["train", str(photos), "-o", str(tmp_path / "scene"), *QUICK]) == 0
+    assert main(["train", str(photos), "-o", str(tmp_path / "scene"), *TRAIN_QUICK]) == 0
     out, err = capsys.readouterr()
     match = re.search(
         r"60 steps, (\d+) voxels; train PSNR ([\d.]+) dB; "
@@ -81,7 +82,7 @@ def test_train_refuses_before_it_trains(
 def test_interrupted_training_is_saved_and_resumed(
     photos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    argv = ["train", str(photos), "-o", str(tmp_path / "scene"), *QUICK]
+    argv = ["train", str(photos), "-o", str(tmp_path / "scene"), *TRAIN_QUICK]
     from cagefield.training.voxels.voxel_run import VoxelRun
 
     advance = VoxelRun.advance
@@ -109,7 +110,7 @@ def test_interrupted_training_is_saved_and_resumed(
     assert not np.array_equal(resumed.density, partial.field.density)
 
     whole = tmp_path / "whole"
-    assert main(["train", str(photos), "-o", str(whole), *QUICK]) == 0
+    assert main(["train", str(photos), "-o", str(whole), *TRAIN_QUICK]) == 0
     np.testing.assert_array_equal(Scene.open(whole).field.density, resumed.density)
 
 
@@ -140,7 +141,7 @@ def test_missing_photos_are_one_line_of_warning(
 ) -> None:
     shutil.copytree(photos, tmp_path / "photos")
     (tmp_path / "photos" / "train" / "r_3.png").unlink()
-    assert main(["train", str(tmp_path / "photos"), "-o", str(tmp_path / "scene"), *QUICK]) == 0
+    assert main(["train", str(tmp_path / "photos"), "-o", str(tmp_path / "scene"), *TRAIN_QUICK]) == 0
     warned = [line for line in capsys.readouterr().err.splitlines() if "warning" in line]
     assert len(warned) == 1 and warned[0].startswith("cagefield: warning: ") and "r_3" in warned[0]
     assert len(Scene.open(tmp_path / "scene").cameras["train"]) == 7
@@ -149,8 +150,8 @@ def test_missing_photos_are_one_line_of_warning(
 def test_auto_takes_voxels_for_a_bounded_scene_and_says_so(
     photos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["train", str(photos), "-o", str(tmp_path / "scene"), *QUICK]) == 0
+    assert main(["train", str(photos), "-o", str(tmp_path / "scene"), *TRAIN_QUICK]) == 0
     err = capsys.readouterr().err
     assert err.startswith("Training voxels, the scene is bounded (--field splat trains splats)\n")
-    assert main(["train", str(photos), "-o", str(tmp_path / "told"), *QUICK, "--field", "voxel"]) == 0
+    assert main(["train", str(photos), "-o", str(tmp_path / "told"), *TRAIN_QUICK, "--field", "voxel"]) == 0
     assert "the scene is bounded" not in capsys.readouterr().err

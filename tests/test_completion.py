@@ -224,7 +224,7 @@ def test_kernel_and_oracle_read_the_same_layers(contracted: bool) -> None:
     stack = PreparedStack([earlier, PreparedEdit(edit, patch)])
     assert len(set(stack.places)) == 2 and min(stack.places) >= max(field.resolution) - BRICK_VERTICES
     camera = Camera.look_at(
-        (1.2 * size, -2.5 * size, 1.4 * size), tuple(box.mean(axis=0)), width=40, height=40, fov_x=0.7
+        (1.2 * size, -2.5 * size, 1.4 * size), tuple(box.mean(axis=0)), width=28, height=28, fov_x=0.7
     )
     frame = VoxelRenderer(field, stack, step=0.25).render(camera, background="black")
     assert frame is not None
@@ -233,7 +233,7 @@ def test_kernel_and_oracle_read_the_same_layers(contracted: bool) -> None:
         source, camera, near=0.0, far=8.0 * size, samples=1000, edits=stack, background="black"
     )
     plain = render_sampled(
-        source, camera, near=0.0, far=8.0 * size, samples=500, background="black",
+        source, camera, near=0.0, far=8.0 * size, samples=250, background="black",
         edits=EditStack([earlier, edit]),
     )  # fmt: skip
     assert db(frame.rgb, oracle.rgb) > 36.0 > 25.0 > db(plain.rgb, oracle.rgb)

@@ -24,7 +24,7 @@ from cagefield.pages.page_splat_edits import (
     decode_page_splat_edits,
     encode_page_splat_edits,
 )
-from cagefield.rendering.splats import splitting
+from cagefield.rendering.splats import split_children
 from cagefield.rendering.splats.bake_splats import baked_splats
 from cagefield.rendering.splats.raster_splats import changed_splats, deformed_splats
 from cagefield.rendering.splats.splat_motion import moved_splats
@@ -135,7 +135,7 @@ def test_a_shadow_has_an_edge_on_splats_that_are_longer_than_that(
         return db(shown.rgb, wanted)
 
     split = off()
-    monkeypatch.setattr(splitting, "SHADE", np.inf)
+    monkeypatch.setattr(split_children, "SHADE", np.inf)
     whole = off()
     assert split > 30.0 and split > whole + 2.0
 

@@ -27,13 +27,20 @@ from cagefield.datasets.sfm.transforms_writer import write_transforms
 from cagefield.datasets.views import Dataset
 from posed_photos import ring, textured_capture
 
-COUNT = 16
+COUNT, WIDTH, HEIGHT = 12, 360, 270
 
 
 @pytest.fixture(scope="module")
 def capture(tmp_path_factory) -> Dataset:
-    folder = textured_capture(tmp_path_factory.mktemp("posed"), COUNT, 1.9, size=(480, 360))
+    folder = textured_capture(tmp_path_factory.mktemp("posed"), COUNT, 1.9, size=(WIDTH, HEIGHT))
     return replace(load_dataset(folder, downscale=1), unbounded=False)  # no search for folds: test_folds
+
+
+@pytest.fixture(scope="module")
+def large_capture(tmp_path_factory) -> Dataset:
+    """More and larger photos."""
+    folder = textured_capture(tmp_path_factory.mktemp("posed"), 16, 1.9, size=(480, 360))
+    return replace(load_dataset(folder, downscale=1), unbounded=False)
 
 
 def disagreement(one: Dataset, other: Dataset) -> tuple[float, float]:
@@ -126,13 +133,13 @@ def test_perturbed_poses_are_adjusted_in_their_world_and_kept_for_next_time(capt
 
 
 @pytest.mark.nightly
-def test_poses_of_other_photos_are_found_anew(capture):
-    order = np.random.default_rng(2).permutation(len(capture.train))
-    cameras = [capture.train[n].camera for n in order]
-    mixed = [replace(view, camera=camera) for view, camera in zip(capture.train, cameras, strict=True)]
-    found = verify_poses(replace(capture, train=tuple(mixed)))
+def test_poses_of_other_photos_are_found_anew(large_capture):
+    order = np.random.default_rng(2).permutation(len(large_capture.train))
+    cameras = [large_capture.train[n].camera for n in order]
+    mixed = [replace(view, camera=camera) for view, camera in zip(large_capture.train, cameras, strict=True)]
+    found = verify_poses(replace(large_capture, train=tuple(mixed)))
     assert found.outcome == "rebuilt" and found.after.median < 0.5
-    turn, offset = disagreement(found.dataset, capture)
+    turn, offset = disagreement(found.dataset, large_capture)
     # Of 480x360 pixels, .1 degrees each: noise of features bends the arc of cameras by some pixels.
     assert turn < 0.6 and offset < 0.04
 
@@ -148,7 +155,7 @@ def test_photos_without_texture_are_not_measured(capture, tmp_path):
 
     views = []
     for view in capture.train:
-        Image.new("RGB", (480, 360), (90, 90, 90)).save(tmp_path / view.name.replace("/", "-"))
+        Image.new("RGB", (WIDTH, HEIGHT), (90, 90, 90)).save(tmp_path / view.name.replace("/", "-"))
         views.append(replace(view, image_path=tmp_path / view.name.replace("/", "-")))
     found = verify_poses(replace(capture, train=tuple(views), test=()))
     assert found.outcome == "unmeasured" and found.before is None
@@ -178,7 +185,7 @@ def test_scattered_focals_of_one_lens_are_shared_only_where_that_fits_as_well():
 
 
 @pytest.mark.nightly
-def test_a_camera_for_each_photo_of_one_lens_becomes_one_camera(capture):
+def test_a_camera_for_each_photo_of_one_lens_becomes_one_camera(large_capture):
     """Focal lengths from .7 to 1.4 of the lens's, and distances that make up for them, as COLMAP has them."""
     rng = np.random.default_rng(5)
 
@@ -189,13 +196,17 @@ def test_a_camera_for_each_photo_of_one_lens_becomes_one_camera(capture):
         camera = replace(view.camera, c2w=c2w, fx=view.camera.fx * scale, fy=view.camera.fy * scale)
         return replace(view, camera=camera)
 
-    given = replace(capture, train=tuple(map(zoomed, capture.train)), test=tuple(map(zoomed, capture.test)))
+    given = replace(
+        large_capture,
+        train=tuple(map(zoomed, large_capture.train)),
+        test=tuple(map(zoomed, large_capture.test)),
+    )
     found = verify_poses(given)
     assert found.before.has_scattered_focals and found.outcome in ("adjusted", "rebuilt")
     assert found.after.median < 0.5
     focals = {round(view.camera.fx, 6) for view in sorted_views(found.dataset)}
-    assert len(focals) == 1 and focals.pop() == pytest.approx(capture.train[0].camera.fx, rel=0.03)
-    turn, offset = disagreement(found.dataset, capture)
+    assert len(focals) == 1 and focals.pop() == pytest.approx(large_capture.train[0].camera.fx, rel=0.03)
+    turn, offset = disagreement(found.dataset, large_capture)
     assert turn < 0.6 and offset < 0.04
 
 
@@ -214,12 +225,12 @@ def test_masked_features_do_not_count(capture, tmp_path):
 
     from cagefield.datasets.views import PhotoMask
 
-    mask = np.zeros((360, 480), np.uint8)
-    mask[:, :240] = 255
+    mask = np.zeros((HEIGHT, WIDTH), np.uint8)
+    mask[:, : WIDTH // 2] = 255
     Image.fromarray(mask).save(tmp_path / "mask.png")
     views = [replace(view, mask=PhotoMask(tmp_path / "mask.png")) for view in sorted_views(capture)]
     matches = match_photos(views)
-    assert matches.pairs and all(p[:, 0].max() < 241 for pair in matches.pixels for p in pair)
+    assert matches.pairs and all(p[:, 0].max() < WIDTH // 2 + 1 for pair in matches.pixels for p in pair)
     assert pose_error(matches, views).median < 0.5
 
 

@@ -19,7 +19,13 @@ from PIL import Image
 
 from cagefield.datasets import load_dataset
 from cagefield.datasets.raw_photos import RawPhoto
-from cagefield.datasets.sfm import colmap_process, features, sfm_workspace, structure_from_motion
+from cagefield.datasets.sfm import (
+    colmap_process,
+    features,
+    registered_capture,
+    sfm_workspace,
+    structure_from_motion,
+)
 from cagefield.datasets.sfm.colmap_process import StoppedError
 from cagefield.datasets.sfm.database_check import recorded_digest
 from cagefield.datasets.sfm.sfm_workspace import (
@@ -185,7 +191,7 @@ def test_a_damaged_database_of_a_killed_run_is_made_anew(
         assert make_poses(folder / "photos", folder / "data").placed == 4
 
 
-@pytest.mark.parametrize("killed", [False, True])
+@pytest.mark.parametrize("killed", nightly_after_first([False, True]))
 def test_a_database_that_is_whole_is_left(
     stopped: Path, tmp_path: Path, killed: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -313,7 +319,7 @@ def test_a_model_that_is_cut_off_replaces_nothing(tmp_path: Path, monkeypatch: p
     photos, target = photos_alone(tmp_path / "photos"), tmp_path / "data"
     make_poses(photos, target)
     before = {file: file.read_bytes() for file in target.rglob("*") if file.is_file()}
-    whole = structure_from_motion._write_model
+    whole = registered_capture.write_model
 
     def cut_off(model: Any, folder: Path) -> None:
         def write(there: Path) -> None:
@@ -323,7 +329,7 @@ def test_a_model_that_is_cut_off_replaces_nothing(tmp_path: Path, monkeypatch: p
 
         whole(SimpleNamespace(write_binary=write), folder)
 
-    monkeypatch.setattr(structure_from_motion, "_write_model", cut_off)
+    monkeypatch.setattr(registered_capture, "write_model", cut_off)
     with pytest.raises(StoppedError, match=f"^{target}: No space left on device; what is done"):
         make_poses(photos, target)
     assert before == {file: file.read_bytes() for file in target.rglob("*") if file.is_file()}

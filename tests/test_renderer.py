@@ -153,7 +153,7 @@ EDITS = {
 }
 
 
-FEWER_PIXELS = CAMERA.resized(26, 21)
+FEWER_PIXELS = CAMERA.resized(20, 16)
 """A smaller view for edited fields, whose plain pictures take seconds."""
 
 

@@ -11,7 +11,7 @@ from cagefield import Cage, Camera, Edit, EditStack
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.quaternions import quaternions_from_matrices, rotation_matrices
 from cagefield.images.metrics import psnr
-from cagefield.rendering.splats import splitting
+from cagefield.rendering.splats import split_children, splitting
 from cagefield.rendering.splats.bake_splats import baked_splats
 from cagefield.rendering.splats.gaussian_profile import part_between
 from cagefield.rendering.splats.raster_splats import deformed_splats
@@ -73,7 +73,7 @@ def test_split_splats_follow_the_edit_more_closely(name: str, monkeypatch: pytes
         return renderer.render(CAMERA, background="black").rgb
 
     whole, split = shown(field), shown(split_for_edits(field, edits).field)
-    monkeypatch.setattr(splitting, "BEND", 0.04)
+    monkeypatch.setattr(split_children, "BEND", 0.04)
     monkeypatch.setattr(splitting, "ROUNDS", 6)
     fine = shown(split_for_edits(dataclasses.replace(field), edits).field)
     assert psnr(split, fine) > psnr(whole, fine) + 1.0
@@ -81,7 +81,7 @@ def test_split_splats_follow_the_edit_more_closely(name: str, monkeypatch: pytes
 
 def test_a_row_of_children_has_the_width_of_the_splat() -> None:
     # Faint ones: optical depths add up, so the row is the splat but for its ripple and its ends, 1 %.
-    row = splitting._row(np.zeros(1, np.int64), np.eye(3)[:1], np.array([0.3]), np.array([1e-4]))
+    row = split_children._row(np.zeros(1, np.int64), np.eye(3)[:1], np.array([0.3]), np.array([1e-4]))
     mass = row.opacity * row.r
     assert np.sum(mass) == pytest.approx(1e-4, rel=0.01)
     variance = np.sum(mass * (row.r**2 + row.x**2)) / np.sum(mass)
@@ -91,7 +91,7 @@ def test_a_row_of_children_has_the_width_of_the_splat() -> None:
 @pytest.mark.parametrize("opacity", [0.2, 0.9, 0.99])
 @pytest.mark.parametrize("r", [0.35, 0.7])
 def test_a_row_is_as_thick_as_the_splat(r: float, opacity: float) -> None:
-    row = splitting._row(np.zeros(1, np.int64), np.eye(3)[:1], np.array([r]), np.array([opacity]))
+    row = split_children._row(np.zeros(1, np.int64), np.eye(3)[:1], np.array([r]), np.array([opacity]))
     u = np.linspace(-6.0, 6.0, 2001)[:, None]
     for x in (0.0, row.x[len(row.x) // 2 + 1]):
         each = row.opacity * np.exp(-0.5 * ((x - row.x) / r) ** 2 - 0.5 * (u / row.across) ** 2)

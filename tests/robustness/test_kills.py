@@ -157,6 +157,7 @@ def test_pictures_and_files_that_would_be_lost_are_seen(tmp_path: Path) -> None:
     assert converted.check(tmp_path / "b", 0) == "lost: out.sog"
 
 
+@pytest.mark.nightly
 def test_poses_that_would_be_lost_are_seen(tmp_path: Path) -> None:
     """The checks of data sets: a photo, a model, or the user's file that is gone, and work that is left."""
     pytest.importorskip("pycolmap", reason="poses are found by pycolmap")

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from cagefield.cameras.camera import Camera
@@ -96,6 +95,8 @@ class Timeline:
 
     def __init__(self, keys: Sequence[Keyframe], *, loop: bool) -> None:
         """Splines through the keys. Raises CameraError for fewer than two keys."""
+        from scipy.interpolate import CubicSpline, PchipInterpolator
+
         if len(keys) < 2:
             raise CameraError(f"a camera path with {len(keys)} keyframes does not move; record at least two")
         ring = [*keys, keys[0]] if loop else list(keys)

@@ -32,6 +32,7 @@ from cagefield.geometry.cage_checks import (
 from cagefield.geometry.hexahedron import EDGES as EDGES
 from cagefield.geometry.hexahedron import FACES as FACES
 from cagefield.geometry.lattice_points import LatticePoints
+from cagefield.geometry.quaternions import rotation_matrix as rotation_matrix
 from cagefield.typing import Array, Mask
 
 Axes: TypeAlias = Literal["world", "cage"]
@@ -396,8 +397,3 @@ class LatticeCage(LatticePoints["LatticeCage"], Cage):
         for bits in hexahedron.BITS[list(corners)]:
             weight += np.where(bits == 1.0, u, 1.0 - u).prod(axis=1)
         return self._moved(self.control_points + weight[:, None] * by, self.pivot)
-
-
-def rotation_matrix(theta: ArrayLike) -> Array:
-    """R_x R_y R_z [3,3], right-handed, for intrinsic XYZ angles [3] in radians."""
-    return np.asarray(Rotation.from_euler("XYZ", np.asarray(theta, dtype=np.float64)).as_matrix())

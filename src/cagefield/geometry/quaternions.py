@@ -1,9 +1,9 @@
-"""Unit quaternions (w, x, y, z) as rotations."""
+"""Rotation matrices of unit quaternions (w, x, y, z) and of angles."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 
 def rotation_matrices(quaternions: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -24,3 +24,10 @@ def quaternions_from_matrices(rotations: NDArray[np.floating]) -> NDArray[np.flo
     if not len(rotations):
         return np.zeros((0, 4))
     return np.asarray(Rotation.from_matrix(rotations).as_quat()[:, [3, 0, 1, 2]])
+
+
+def rotation_matrix(theta: ArrayLike) -> NDArray[np.float64]:
+    """R_x R_y R_z [3,3], right-handed, for intrinsic XYZ angles [3] in radians."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_euler("XYZ", np.asarray(theta, dtype=np.float64)).as_matrix())

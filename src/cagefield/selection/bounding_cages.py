@@ -7,7 +7,6 @@ objective is the product of the extents between two quantiles, so that outliers 
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from cagefield.errors import CagefieldError
@@ -132,6 +131,8 @@ def _extent(low: Array, high: Array) -> tuple[Array, Array]:
 
 def _nearest_to_world(turn: Array) -> Array:
     """The columns of a rotation, in order and direction nearest to the world's axes; right-handed."""
+    from scipy.optimize import linear_sum_assignment
+
     _, order = linear_sum_assignment(-np.abs(turn))
     axes = turn[:, order]
     axes = axes * np.where(np.diagonal(axes) < 0.0, -1.0, 1.0)

@@ -13,7 +13,6 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
 from cagefield.completion.surfaces.footprint import MAX_SPLINE_KNOTS
@@ -139,6 +138,8 @@ class KnownSplats:
             return coordinates
         _, first = np.unique(np.round(uv[members], 3), axis=0, return_index=True)
         members = members[first][:MAX_SPLINE_KNOTS]
+        from scipy.interpolate import RBFInterpolator
+
         spline = RBFInterpolator(uv[members], height[members], neighbors=32, smoothing=1.0)
         change = np.clip(
             spline(target_uv) - target_height, -MAX_HEIGHT_CHANGE_VOXELS, MAX_HEIGHT_CHANGE_VOXELS

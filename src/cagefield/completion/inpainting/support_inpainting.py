@@ -13,7 +13,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, sparse
-from scipy.sparse.linalg import factorized
 
 from cagefield.completion.inpainting.coherence_transport import estimate_orientation, transport_colors
 from cagefield.completion.inpainting.exemplar_inpainting import inpaint_texture
@@ -324,6 +323,8 @@ def solve_membrane(hole: Mask, given: Mask, table: Array) -> Array:
         links.append((np.flatnonzero(is_unknown), number[other[is_unknown]]))
     rows, columns = (np.concatenate(part) for part in zip(*links, strict=True))
     adjacency = sparse.csc_matrix((np.ones(len(rows)), (rows, columns)), (len(unknown),) * 2)
+    from scipy.sparse.linalg import factorized
+
     solve = factorized((sparse.diags(degree) - adjacency).tocsc())
     out = table.copy()
     mean = table[given.reshape(-1)].mean(axis=0) if given.any() else np.zeros(table.shape[1])

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.interpolate import RBFInterpolator
 
 from cagefield.completion.surfaces.grid_block import GridBlock, world_positions
 from cagefield.completion.surfaces.support_plane import MIN_SUPPORT_SURFELS, PLANE_DISTANCE_VOXELS, Support
@@ -172,6 +171,8 @@ def build_footprint(support: Support, part: Mask, contact: Array, shaded: Surfel
     if len(knots) < MIN_SUPPORT_SURFELS:
         return None
     knots = rng.choice(knots, min(MAX_SPLINE_KNOTS, len(knots)), replace=False)
+    from scipy.interpolate import RBFInterpolator
+
     spline = RBFInterpolator(uv[knots], member_height[knots], neighbors=64, smoothing=4.0)
     cells = np.argwhere(hole | surroundings)
     height = np.zeros(size)

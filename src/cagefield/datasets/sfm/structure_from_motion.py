@@ -10,17 +10,13 @@ matches), from which an interrupted run continues; it is removed at the end.
 
 from __future__ import annotations
 
-import errno
-import json
-import os
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from cagefield.cameras.camera import Camera
-from cagefield.datasets.colmap.colmap_files import check_complete
 from cagefield.datasets.colmap.colmap_lenses import lens_views
 from cagefield.datasets.colmap.colmap_model import image_pose
 from cagefield.datasets.raw_photos import RawPhoto
@@ -28,7 +24,8 @@ from cagefield.datasets.sfm import disambiguation, features, moving_features
 from cagefield.datasets.sfm.database_check import check_database, recorded_digest
 from cagefield.datasets.sfm.features import OnProgress, Photo
 from cagefield.datasets.sfm.matching import match
-from cagefield.datasets.sfm.raw_masks import VALID_FOLDER
+from cagefield.datasets.sfm.registered_capture import PosesReport as PosesReport
+from cagefield.datasets.sfm.registered_capture import write_capture
 from cagefield.datasets.sfm.registration_report import (
     Matches,
     explain_no_model,
@@ -45,10 +42,10 @@ from cagefield.datasets.sfm.sfm_workspace import (
     remove_work,
     work_folder,
 )
-from cagefield.datasets.sfm.transforms_writer import RECORD_FILE, WRITTEN_FILES
+from cagefield.datasets.sfm.transforms_writer import RECORD_FILE
 from cagefield.errors import DatasetError
 from cagefield.files import json_text
-from cagefield.files.atomic import recover_folder, replaced_folder
+from cagefield.files.atomic import recover_folder
 from cagefield.files.safe_open import read_text
 
 MAX_EXHAUSTIVE_PHOTOS = 120
@@ -68,29 +65,6 @@ MIN_RADIAL_PHOTOS = 12
 Both have square pixels: cameras that are held level do not tell their aspect from a stretched scene."""
 
 _GUESSED_FOCAL_SIDES = 1.2  # focal length over the longer side, where the camera wrote none
-
-
-@dataclass(frozen=True)
-class PosesReport:
-    """Numbers of registered photos and points, and the reasons for photos that were left out.
-
-    Attributes:
-        folder: the data set.
-        total: number of photos, readable or not.
-        placed: number of registered photos.
-        points: number of sparse points.
-        error: mean reprojection error in pixels.
-        left_out: reason, by name, for the other photos.
-        moving: number of photos whose features on moving things were left out.
-    """
-
-    folder: Path
-    total: int
-    placed: int
-    points: int
-    error: float
-    left_out: Mapping[str, str] = field(default_factory=dict)
-    moving: int = 0
 
 
 def make_poses(
@@ -193,7 +167,7 @@ def _build(
         left_out,
         len(reconstructions.moving),
     )
-    _write(model, photos, placed, target, record, report)
+    write_capture(model, photos, placed, target, record, report)
     return report
 
 
@@ -370,55 +344,3 @@ def _map(
         poll=poll,
     )
     return sorted(models.values(), key=lambda m: (-m.num_reg_images(), -m.num_points3D()))
-
-
-def _write(
-    model: Any,
-    photos: Sequence[RawPhoto],
-    placed: set[int],
-    target: Path,
-    record: Mapping[str, Any],
-    report: PosesReport,
-) -> None:
-    """Write the data set, whole or not at all."""
-    for index in placed:
-        model.image(index + 1).name = photos[index].name
-    for image_id in [number for number in model.images if number - 1 not in placed]:
-        del model.images[image_id]
-    with replaced_folder(target, WRITTEN_FILES) as draft:
-        for index in sorted(placed):
-            photo = photos[index]
-            _link(photo.path, draft / "images" / photo.name)
-            mask = work_folder(target) / VALID_FOLDER / f"{photo.name}.png"
-            if mask.is_file():
-                _link(mask, draft / "masks" / f"{photo.name}.png")
-        (draft / "sparse/0").mkdir(parents=True)
-        _write_model(model, draft / "sparse/0")
-        summary = {
-            "made_of": record,
-            "photos": report.total,
-            "placed": report.placed,
-            "points": report.points,
-            "reprojection_error": round(report.error, 4),
-            "left_out": dict(report.left_out),
-        }
-        (draft / RECORD_FILE).write_text(json.dumps(summary, indent=1), encoding="utf-8")
-
-
-def _link(file: Path, target: Path) -> None:
-    """Hard-link a file to another path, or copy it where links fail."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        os.link(file, target)
-    except OSError:
-        shutil.copy2(file, target)
-
-
-def _write_model(model: Any, folder: Path) -> None:
-    """Write the files of a model. Raises OSError where they are truncated: COLMAP does not notice."""
-    with features.silence_log():
-        model.write_binary(folder)
-    try:
-        check_complete(folder)
-    except DatasetError as error:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from error

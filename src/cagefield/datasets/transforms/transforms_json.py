@@ -119,3 +119,14 @@ def remove_scale(pose: FloatArray) -> tuple[FloatArray, float]:
     pose = pose.copy()
     pose[:3, :3] = rotation
     return pose, scale
+
+
+def read_box(where: str, value: object) -> npt.NDArray[np.float64]:
+    """Scene box [2,3] that a file gives as [[min], [max]]."""
+    try:
+        box = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        box = np.full((2, 3), np.nan)
+    if box.shape != (2, 3) or not np.isfinite(box).all() or not (box[0] < box[1]).all():
+        raise DatasetError(f"{where}: key 'aabb' must be [[min x, y, z], [max x, y, z]], got {value!r:.80}")
+    return box

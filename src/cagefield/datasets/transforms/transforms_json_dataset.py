@@ -37,7 +37,13 @@ from cagefield.datasets.photo_names import FoundPhotos, find_photos, view_name
 from cagefield.datasets.photos import choose_downscale, is_cut_out, read_header
 from cagefield.datasets.scene_bounds import cube_of_interest, depths_of_points
 from cagefield.datasets.transforms.point_files import read_points
-from cagefield.datasets.transforms.transforms_json import read_json, read_matrix, read_number, remove_scale
+from cagefield.datasets.transforms.transforms_json import (
+    read_box,
+    read_json,
+    read_matrix,
+    read_number,
+    remove_scale,
+)
 from cagefield.datasets.transforms.transforms_lenses import build_frame_lenses
 from cagefield.datasets.views import (
     Dataset,
@@ -372,22 +378,11 @@ def _bounds(
     if aabb_scale is not None and aabb_scale <= 1:
         return False, _ngp_unit_cube(file)
     if synthetic and "aabb" in file.values:
-        return False, _box(where, file.values["aabb"])
+        return False, read_box(where, file.values["aabb"])
     if synthetic and cut_out and aabb_scale is None:
         return False, np.array([[-_SYNTHETIC_HALF_SIZE] * 3, [_SYNTHETIC_HALF_SIZE] * 3])
     positions = None if points is None else points.positions
     return aabb_scale is not None or not cut_out, cube_of_interest(cameras, points=positions)
-
-
-def _box(where: str, value: object) -> npt.NDArray[np.float64]:
-    """Scene box [2,3] that a file gives as [[min], [max]]."""
-    try:
-        box = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        box = np.full((2, 3), np.nan)
-    if box.shape != (2, 3) or not np.isfinite(box).all() or not (box[0] < box[1]).all():
-        raise DatasetError(f"{where}: key 'aabb' must be [[min x, y, z], [max x, y, z]], got {value!r:.80}")
-    return box
 
 
 def _ngp_unit_cube(file: _TransformsFile) -> npt.NDArray[np.float64]:

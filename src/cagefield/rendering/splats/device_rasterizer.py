@@ -19,6 +19,7 @@ from cagefield.compute.devices import floats, ints
 from cagefield.rendering.device_image import DeviceSums, SumBuffers
 from cagefield.rendering.splats.device_sorting import passes_of, sort_scratch
 from cagefield.rendering.splats.kernels import device_rasterizer as kernels
+from cagefield.rendering.splats.kernels import device_splat_args
 from cagefield.rendering.splats.kernels.blending import T_MIN
 from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE_PX
 from cagefield.rendering.splats.raster_splats import DeformedSplats
@@ -43,7 +44,7 @@ class SplatArrays:
         self.splats = splats
         self.has_normals = normals is not None
         self.buffers, self.sum_buffers = DeviceBuffers(), SumBuffers()
-        self.args = kernels.SplatArgs(
+        self.args = device_splat_args.SplatArgs(
             means=to_device(splats.means),
             covariances=to_device(splats.covariances),
             opacities=to_device(splats.opacities),
@@ -131,7 +132,7 @@ def project(
 
 
 def project_args(
-    splats: kernels.SplatArgs,
+    splats: device_splat_args.SplatArgs,
     terms: int,
     camera: Camera,
     near: float,
@@ -146,7 +147,7 @@ def project_args(
     kernels.project(
         splats,
         camera_args(camera, near, (x, y, width, height)),
-        kernels.ProjectionArgs(packed, depths, boxes),
+        device_splat_args.ProjectionArgs(packed, depths, boxes),
         terms,
         intrinsics(camera).model,
     )
@@ -186,12 +187,12 @@ def project_args(
     return DeviceProjection(packed, boxes, ids, starts, pairs, width, height)
 
 
-def camera_args(camera: Camera, near: float, region: Region | None = None) -> kernels.CameraArgs:
+def camera_args(camera: Camera, near: float, region: Region | None = None) -> device_splat_args.CameraArgs:
     """Kernel arguments of a camera and the part (x, y, width, height) of its image."""
     x, y, width, height = region or (0, 0, camera.width, camera.height)
     lens = intrinsics(camera)
     origin = camera.origin.astype(np.float32).astype(np.float64)
-    return kernels.CameraArgs(
+    return device_splat_args.CameraArgs(
         floats(world_to_camera(camera)),
         floats(origin),
         floats(camera.origin - origin),

@@ -13,20 +13,19 @@ its inputs are events with their times, its output the next image.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 from cagefield.server.protocol.common import DrawnHere
 from cagefield.server.render_queue.damage import (
     WHOLE,
     Differing,
     Rect,
-    Showing,
     everywhere,
     pixels,
     tiles,
     union,
 )
 from cagefield.server.render_queue.frame_cost import FrameCost
+from cagefield.server.render_queue.page_state import PageState
 from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_worker.refinement import FINAL, Refinement
 from cagefield.server.render_worker.view import Display, Region
@@ -57,40 +56,6 @@ RESOLUTION_SCALES = (1.0, 0.8, 0.65, 0.5, 0.4, 0.32, 0.25, 0.2, 0.16, 0.125)
 """Resolutions of moving pictures as shares of the full one: a few, since each has its own ray directions."""
 
 
-@dataclass
-class _Page:
-    """State of a page."""
-
-    width: int = 0
-    height: int = 0
-    camera: int = -1
-    moving: bool = False
-    display: Display = field(default_factory=Display)
-    unshown: list[int] = field(default_factory=list)
-    changed: float = -math.inf
-    """When its view changed last."""
-    version: int = 0
-    """Counts changes of the view."""
-    shown_version: int = -1
-    """The version that the last picture of the whole view shows."""
-    tiles: list[Region] | None = None
-    """Tiles of the present version that are still to come; None before they are cut."""
-    whole: bool = False
-    """Whether those tiles are of the whole view."""
-    showing: Showing = field(default_factory=Showing)
-    refinement: Refinement = Refinement.DRAFT
-    """Refinement of those tiles."""
-    attained: Refinement = FINAL
-    """Refinement that all of those tiles have that were rendered."""
-    tiles_spent: tuple[int, int, float] = (0, 0, 0.0)
-    """Number, rays and seconds of the tiles that were rendered."""
-    served: float = -math.inf
-    draws: DrawnHere = "nothing"
-    """Which pictures the page draws itself."""
-    edits: tuple[int, Refinement, bool] | None = None
-    """Edits that the page was sent last: revision, refinement, and whether they were those of a drag."""
-
-
 class Scheduler:
     """See the module. Times are seconds of any one clock."""
 
@@ -101,7 +66,7 @@ class Scheduler:
         """
         self._differing = differing
         self.whole_at_rest = whole_at_rest
-        self._pages: dict[int, _Page] = {}
+        self._pages: dict[int, PageState] = {}
         self._numbers = 0
         self._cost = FrameCost()
         self._overhead = 0.0
@@ -117,7 +82,7 @@ class Scheduler:
 
     def join(self, page: int) -> None:
         """A page is open."""
-        self._pages[page] = _Page()
+        self._pages[page] = PageState()
 
     def leave(self, page: int) -> None:
         """A page is closed."""
@@ -308,13 +273,13 @@ class Scheduler:
         if self._running is not None and not self._running[0].moving and self._running[0].page == page:
             self.generation += 1
 
-    def _has_room(self, p: _Page) -> bool:
+    def _has_room(self, p: PageState) -> bool:
         return len(p.unshown) < (MOST_MOVING if p.moving or self._dragging else MOST_UNSHOWN)
 
-    def _owes_moving(self, p: _Page) -> bool:
+    def _owes_moving(self, p: PageState) -> bool:
         return p.shown_version != p.version
 
-    def _owes_edits(self, p: _Page) -> bool:
+    def _owes_edits(self, p: PageState) -> bool:
         if p.draws == "nothing":
             return False
         if p.edits is None or p.edits[0] != self._revision:
@@ -325,7 +290,7 @@ class Scheduler:
             return False
         return p.draws == "all" or not self._owes_tiles(p)
 
-    def _owes_tiles(self, p: _Page) -> bool:
+    def _owes_tiles(self, p: PageState) -> bool:
         """Whether tiles are still to come, or to be cut: of this refinement or the next."""
         if p.draws == "all":
             return p.tiles is None
@@ -394,7 +359,7 @@ class Scheduler:
             complete,
         )
 
-    def _scale(self, p: _Page, rect: Rect | None) -> float:
+    def _scale(self, p: PageState, rect: Rect | None) -> float:
         _, _, width, height = pixels(rect, p.width, p.height)
         wanted, longest = (
             math.sqrt(self._cost.rays(seconds - self._overhead, 0.4 * MOVING_SECONDS) / (width * height))

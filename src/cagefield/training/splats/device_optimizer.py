@@ -18,6 +18,7 @@ from cagefield.compute.device_buffers import DeviceBuffers
 from cagefield.compute.devices import floats, ints
 from cagefield.rendering.splats.device_rasterizer import DeviceProjection, camera_args, project_args
 from cagefield.rendering.splats.kernels import device_rasterizer as raster_kernels
+from cagefield.rendering.splats.kernels import device_splat_args
 from cagefield.rendering.splats.kernels.blending import SUMS
 from cagefield.rendering.splats.kernels.projection import AREA
 from cagefield.rendering.splats.rasterizer import COLOR, intrinsics
@@ -83,7 +84,7 @@ class DeviceSplatOptimizer:
             self._parameters(), mask, int(kept is not None), covariances, self._opacities, count
         )
         unused = buffers.take("unused", 1)
-        splats = raster_kernels.SplatArgs(
+        splats = device_splat_args.SplatArgs(
             means=self._arrays["means"],
             covariances=covariances,
             opacities=self._opacities,

@@ -14,7 +14,8 @@ The oracle is finite differences of `cagefield.rendering.splats.reference_raster
 
 from cagefield.compute.quadrants import qd
 from cagefield.rendering.splats.kernels.blending import SUMS
-from cagefield.rendering.splats.kernels.device_rasterizer import CameraArgs, distort, mat3, vec2, vec4, vec6
+from cagefield.rendering.splats.kernels.device_rasterizer import distort
+from cagefield.rendering.splats.kernels.device_splat_args import CameraArgs, mat3, vec2, vec4, vec6
 from cagefield.rendering.splats.kernels.projection import BLUR, LEAST_COMPENSATION
 from cagefield.rendering.voxels.kernels.grid import F32, I32, U8, vec3
 from cagefield.training.splats.kernels.device_args import ParameterArgs

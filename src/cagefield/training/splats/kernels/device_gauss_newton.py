@@ -6,7 +6,7 @@ One thread has one splat. Blocks are divided by their traces before they are sol
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
 from cagefield.compute.quadrants import qd
-from cagefield.rendering.splats.kernels.device_rasterizer import CameraArgs
+from cagefield.rendering.splats.kernels.device_splat_args import CameraArgs
 from cagefield.rendering.voxels.kernels.grid import F32, I32, sh_basis, vec3
 from cagefield.training.splats.kernels.device_args import AverageArgs, ParameterArgs, StepArgs
 from cagefield.training.splats.kernels.gauss_newton_splats import (
