@@ -400,7 +400,7 @@ class Scene:
         from cagefield.rendering.nerf.nerf_renderer import NerfRenderer
 
         # Patches are voxels: too rough for what a continuous edit bends, and for parts with soft seams.
-        edits = [edit.replace(feather=0.0) if edit.feather else edit for edit in self.edits]
+        edits = [edit.replace(feather=0.0) if edit.feather else edit for edit in self.edits.resolved]
         exact = self.patcher.prepare(edits, relight_continuous=False).without_lattices()
         return NerfRenderer(original, exact, self.preserve_opacity)
 
@@ -441,8 +441,11 @@ class Scene:
 
     @property
     def prepared_edits(self) -> PreparedStack:
-        """The edits with the patches that they ask for. Raises EditError for a paste that is not possible."""
-        return self.patcher.prepare(self.edits.edits, preserve_opacity=self.preserve_opacity)
+        """The edits in the order of application, with the patches that they ask for.
+
+        Raises EditError for a paste or a parent that is not possible.
+        """
+        return self.patcher.prepare(self.edits.resolved, preserve_opacity=self.preserve_opacity)
 
     @cached_property
     def up(self) -> Array:

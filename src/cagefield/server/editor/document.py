@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import Edit, EditStack
+from cagefield.edits.chains import application_order
 from cagefield.edits.operations import Operation
 from cagefield.edits.shells import SMOOTH_FLOW, Flow
 from cagefield.errors import EditError
@@ -67,6 +68,14 @@ class Document:
     def stack(self) -> EditStack:
         """The edits as a stack."""
         return EditStack(entry.edit for entry in self.entries)
+
+    @property
+    def applied(self) -> tuple[Entry, ...]:
+        """The entries in the order of application: children directly before their parents."""
+        if not any(entry.edit.parent for entry in self.entries):
+            return self.entries
+        order = application_order([entry.edit for entry in self.entries])
+        return tuple(self.entries[number] for number in order)
 
     @property
     def saved_part(self) -> Document:

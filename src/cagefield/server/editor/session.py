@@ -101,18 +101,25 @@ class Session:
         return self._problems.put(edit, found or self._source_problem(edit))
 
     def drawn(self) -> tuple[Edit, ...]:
-        """The edits that the picture shows: enabled, changing something, and possible; or the preview's."""
+        """The edits that the picture shows, in the order of application; or the preview's.
+
+        They are enabled, change something, and are possible.
+        """
         if self.preview is not None:
             return self.preview.edits
-        edits = (entry.edit for entry in self.shown.entries)
+        edits = (entry.edit for entry in self.shown.applied)
         return tuple(
-            edit for edit in edits if edit.enabled and edit.changes_anything and self.problem(edit) is None
+            edit.without_parent
+            for edit in edits
+            if edit.enabled and edit.changes_anything and self.problem(edit) is None
         )
 
     def below(self, number: int) -> tuple[Edit, ...]:
         """Drawn edits before edit `number`, which define the space of its inner cage."""
-        first = self.document.entries[: self.document.place(number)]
-        return tuple(entry.edit for entry in first if entry.edit.enabled and self.problem(entry.edit) is None)
+        applied = self.document.applied
+        first = applied[: applied.index(self.document.entry(number))]
+        edits = (entry.edit for entry in first)
+        return tuple(edit.without_parent for edit in edits if edit.enabled and self.problem(edit) is None)
 
     # ---- drags ----
 

@@ -97,7 +97,7 @@ class Exports:
 
     async def _write(self, export: _Export) -> None:
         document = self._session.document
-        edits = tuple(entry.edit for entry in document.entries if entry.edit.enabled)
+        edits = tuple(entry.edit.without_parent for entry in document.applied if entry.edit.enabled)
         edits = tuple(e for e in edits if e.changes_anything and self._session.problem(e) is None)
         path = self._path(export)
         try:
