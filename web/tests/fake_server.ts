@@ -29,6 +29,8 @@ export function edit(change: Partial<EditState> = {}): EditState {
     inner_pivot: [0, 0, 0],
     outer_pivot: [0, 0, 0],
     operations: [],
+    parent: null,
+    carrier: null,
     problem: null,
     ...change,
   };

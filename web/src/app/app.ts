@@ -1,6 +1,7 @@
 /** The editor: its parts, connected to each other, to the server's messages and to the canvas. */
 import { Vector3 } from "three";
-import { cageOverlay, shownCages } from "../editing/cage_overlay";
+import { cageOverlay, restCages, shownCages } from "../editing/cage_overlay";
+import { carrierRotation, carryPoint } from "../editing/carrier";
 import { Drag, targetCage } from "../editing/drag";
 import { Gizmo } from "../editing/gizmo";
 import { Grid } from "../editing/grid";
@@ -218,7 +219,8 @@ export class App {
     const { now } = this.store;
     const edit = selectedEdit(now);
     const eye = this.viewport.camera.position.toArray();
-    const grid = now.grid && edit !== null ? this.grid.linesFor(edit, shownCages(edit, this.drag)) : [];
+    const lines = now.grid && edit !== null ? this.grid.linesFor(edit, restCages(edit, this.drag)) : [];
+    const grid = lines.map((line) => line.map((point) => carryPoint(edit?.carrier ?? null, point)));
     const { segments, dots } = cageOverlay(now, this.drag, grid, eye, this.viewport.forward.toArray());
     this.lines.set(segments);
     this.handles.set(dots);
@@ -232,7 +234,7 @@ export class App {
     }
     const cage = targetCage(shownCages(edit, this.drag), dragTarget(now));
     if (this.gizmo.dragging) this.gizmo.moveTo(this.gizmoPosition ?? new Vector3(...cage.pivot));
-    else this.gizmo.show(now.tool, now.axes, cage, this.gizmoPosition);
+    else this.gizmo.show(now.tool, now.axes, cage, this.gizmoPosition, carrierRotation(edit.carrier));
   }
 
   /** The cages of an edit as they are drawn, a drag in progress included. */

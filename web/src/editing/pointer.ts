@@ -2,6 +2,7 @@
 import { Plane, Vector3 } from "three";
 import { partCorners, halfExtent, faceNormal, type CagePart } from "./cage";
 import type { App } from "../app/app";
+import { operationAtRest } from "./carrier";
 import { targetCage } from "./drag";
 import { asPointMove, moveCornersBy, closestPointOnLine, intersectPlane } from "./gestures";
 import { snapLength, snapOperation, type Operation } from "./operations";
@@ -90,10 +91,11 @@ export class Pointer {
   /** Applies the mouse's position to the drag again, after a change of snapping or constraint. */
   applyMotion(): void {
     if (this.hold === null) return;
-    const raw = this.operation(this.hold);
+    const carried = this.operation(this.hold);
     const { drag } = this.app;
     this.appliedAt = { ...this.position };
-    if (raw === null || drag === null) return;
+    if (carried === null || drag === null) return;
+    const raw = operationAtRest(drag.edit.carrier, carried);
     const cage = targetCage(drag.start, drag.target);
     this.app.moveDrag(asPointMove(this.snap(raw), cage, this.proportional), this.latestEvent.time);
   }
@@ -240,7 +242,7 @@ export class Pointer {
     const drag = this.app.beginDrag(now.mode === "edit" ? "field" : hover.cage);
     if (drag === null) return;
     if (!together && now.corners.length > 0) this.app.store.set({ corners: [] });
-    const cage = targetCage(drag.start, drag.target);
+    const cage = targetCage(shownCages(drag.edit, drag), drag.target);
     const at = new Vector3(...middleOf(cage, own));
     const line =
       hover.part.kind === "face" && !together

@@ -215,6 +215,10 @@ export interface Change {
    * 0: exact
    */
   lattice?: number | null;
+  /**
+   * the edit that carries this one; 0: none
+   */
+  parent?: number | null;
 }
 /**
  * Selects all or none, inverts the selection, or grows or shrinks it by a cell.
@@ -629,6 +633,8 @@ export interface EditState {
   inner_pivot: Vec3;
   outer_pivot: Vec3 | null;
   operations: string[];
+  parent: number | null;
+  carrier: number[] | null;
   problem: string | null;
 }
 /**
