@@ -52,6 +52,7 @@ export function state(change: Partial<State> = {}): State {
     keys: [],
     loop: false,
     selection: null,
+    removed: null,
     isolated: false,
     ...change,
   };

@@ -198,7 +198,7 @@ export class App {
     this.viewport.invalidate();
   }
 
-  /** Switches to Set mode, of control points to Edit mode, as soon as the requested new edit arrives. */
+  /** Switches to Set mode, of a cage with control points to Edit mode, as soon as the requested new edit arrives. */
   expectEdit(): void {
     this.lastEditId = Math.max(0, ...(this.store.now.state?.edits.map((edit) => edit.id) ?? []));
   }
@@ -303,8 +303,8 @@ export class App {
     this.store.set({ state, ...(isOther || hasOtherHandles ? { corners: [], hover: null } : {}) });
     if (isExpected) {
       this.lastEditId = null;
-      const isOfPoints = selectedEdit(this.store.now)?.cage === "points";
-      this.store.set({ mode: isOfPoints ? "edit" : "set", cage: "inner" });
+      const hasPoints = selectedEdit(this.store.now)?.cage !== "box";
+      this.store.set({ mode: hasPoints ? "edit" : "set", cage: "inner" });
     }
   }
 

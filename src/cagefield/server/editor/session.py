@@ -18,8 +18,8 @@ from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
-from cagefield.selection.bounding_cages import outer_cage_of_box
 from cagefield.selection.element_selection import Mode, Selection
+from cagefield.selection.selection_cages import outer_cage_of_shape
 from cagefield.server.editor.active_drags import Drags
 from cagefield.server.editor.cage_placement import cage_pair_around, outer_cage_around
 from cagefield.server.editor.chain_edits import Carriers, renamed, with_own_names, with_parent, without
@@ -288,7 +288,7 @@ class Session:
 
     def place_around_selection(self, inner: Cage) -> int:
         """The number of a new continuous edit, selected, its inner cage around the selected elements."""
-        outer = outer_cage_of_box(inner)
+        outer = outer_cage_of_shape(inner)
         edit = Edit.continuous(inner, outer, name=fresh_name(self.document, "edit"), lattice=LATTICE)
         return self._add("Cage around the selection", edit)
 

@@ -210,6 +210,7 @@ def state_of(
         ],
         loop=document.loop,
         selection=_count_of(document.selection),
+        removed=_count_of(document.removed),
         isolated=session.isolated is not None,
     )
 

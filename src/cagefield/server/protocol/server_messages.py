@@ -135,6 +135,8 @@ class State(Message):
     loop: bool
     selection: SelectionCount | None
     """Selected elements of the field; None for none."""
+    removed: SelectionCount | None
+    """Deleted elements of the field; None for none."""
     isolated: bool
     """True where pictures show isolated elements alone."""
 

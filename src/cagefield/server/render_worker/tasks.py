@@ -13,6 +13,7 @@ from cagefield.edits import Edit
 from cagefield.geometry.cage import Cage
 from cagefield.selection.element_selection import Selection
 from cagefield.selection.elements import Attribute
+from cagefield.selection.selection_cages import CageShape
 from cagefield.server.render_worker.picks import Pick
 from cagefield.server.render_worker.refinement import Refinement
 from cagefield.server.render_worker.view import Display, Region
@@ -219,12 +220,13 @@ class HistogramTask:
 
 @dataclass(frozen=True)
 class BoxTask:
-    """Corners of an oriented box around the selected elements as edits show them; `margin` in cells."""
+    """Cage of a shape around the selected elements as edits show them; `margin` in cells."""
 
     number: int
     shown: Shown
     selection: Selection
     margin: float
+    shape: CageShape = "box"
 
 
 @dataclass(frozen=True)

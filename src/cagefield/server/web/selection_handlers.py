@@ -32,7 +32,7 @@ async def change_selection(coordinator: Coordinator, page: Page, message: messag
     if isinstance(message, messages.Isolate):
         coordinator.session.isolate(message.on)
     elif isinstance(message, messages.SelectionCage):
-        await _place_cage(coordinator, message.margin)
+        await _place_cage(coordinator, message)
     elif isinstance(message, messages.ChangeSelection):
         await _change(coordinator, message)
     else:
@@ -68,13 +68,15 @@ async def _change(coordinator: Coordinator, message: messages.ChangeSelection) -
         session.pick(_LABELS[message.change], await _picked(coordinator, pick))
 
 
-async def _place_cage(coordinator: Coordinator, margin: float) -> None:
+async def _place_cage(coordinator: Coordinator, message: messages.SelectionCage) -> None:
     selection = coordinator.session.document.selection
     if selection is None:
         raise CagefieldError(NOTHING_SELECTED)
     shown = coordinator.shown()
-    corners = await coordinator.ask(lambda number: BoxTask(number, shown, selection, margin))
-    coordinator.session.place_around_selection(Cage(np.array(corners)))
+    cage: Cage = await coordinator.ask(
+        lambda number: BoxTask(number, shown, selection, message.margin, message.cage)
+    )
+    coordinator.session.place_around_selection(cage)
 
 
 def _pick_of(coordinator: Coordinator, page: Page, message: messages.SelectionMessage) -> tuple[str, Pick]:
