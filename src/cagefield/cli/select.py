@@ -143,5 +143,5 @@ class Select:
                 "delete with a cage (--to-cage), or bake voxels alone"
             )
         rest = without_elements(scene.field, elements, mask)
-        dataclasses.replace(scene, field=rest).save(out, self.overwrite)
+        dataclasses.replace(scene, field=rest, removal=None).save(out, self.overwrite)
         print(f"scene without them written to {out}")

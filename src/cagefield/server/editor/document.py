@@ -41,6 +41,7 @@ class Document:
     """The edits in order, the scene's opacity choice, the camera path's keyframes, and the selected elements.
 
     The selection is undone as edits are, all pages share it, and no file has it; None selects nothing.
+    Elements in `removed` are deleted from the field; None deletes nothing.
     """
 
     entries: tuple[Entry, ...] = ()
@@ -48,6 +49,7 @@ class Document:
     keys: tuple[Keyframe, ...] = ()
     loop: bool = False
     selection: Selection | None = None
+    removed: Selection | None = None
 
     @classmethod
     def from_edits(
@@ -57,9 +59,10 @@ class Document:
         preserve_opacity: bool = True,
         keys: tuple[Keyframe, ...] = (),
         loop: bool = False,
+        removed: Selection | None = None,
     ) -> Document:
         """The document of an edit stack, its edits numbered from 1."""
-        document = cls((), preserve_opacity, keys, loop)
+        document = cls((), preserve_opacity, keys, loop, removed=removed)
         for number, edit in enumerate(edits, start=1):
             document = document.insert(Entry(number, edit, document.next_colour))
         return document

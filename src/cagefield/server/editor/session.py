@@ -275,9 +275,31 @@ class Session:
 
     def select_elements(self, label: str, selection: Selection | None) -> None:
         """Another selection of elements; an entry of the history where it changes."""
+        removed = self.document.removed
+        if selection and removed is not None:
+            selection = selection.combine(removed, "subtract")
         selection = selection or None
         if selection != self.document.selection:
             self._push(label, replace(self.document, selection=selection))
+
+    def remove_elements(self) -> None:
+        """The selected elements are deleted from the field. Raises EditError without any, or where they are
+        all."""
+        selection = self.document.selection
+        if selection is None:
+            raise EditError(NOTHING_SELECTED)
+        before = self.document.removed or Selection.none(selection.total)
+        removed = before.combine(selection, "add")
+        if removed.count == removed.total:
+            raise EditError("the selection is all of the field; leave something, or invert it (Ctrl+I)")
+        self.isolated = None
+        self._push("Delete selected", replace(self.document, selection=None, removed=removed))
+
+    def restore_elements(self) -> None:
+        """All deleted elements are there again. Raises EditError where none are deleted."""
+        if self.document.removed is None:
+            raise EditError("nothing is deleted from the field")
+        self._push("Restore deleted", replace(self.document, removed=None))
 
     def isolate(self, on: bool) -> None:
         """Show the selected elements alone, on all pages, or all again. Raises EditError without any."""

@@ -56,6 +56,8 @@ class SelectionHandlers:
             picked = self._picked(task.shown, task.pick)
             if task.shown.isolated is not None:
                 picked = picked & self._mask(task.shown.isolated)
+            if task.shown.removed is not None:
+                picked = picked & ~self._mask(task.shown.removed)
             return Selection.from_mask(picked)
         elements = self._elements
         if isinstance(task, HistogramTask):
@@ -140,7 +142,10 @@ class SelectionHandlers:
         if found is None:
             raise CagefieldError("there is no surface under the mouse; click on the object")
         point, _ = found
-        seen = self._positions(shown, np.arange(len(self._elements)))
+        there = np.ones(len(self._elements), bool)
+        if shown.removed is not None:
+            there &= ~self._mask(shown.removed)
+        seen = self._positions(shown, np.flatnonzero(there))
         if not len(seen.points):
             raise CagefieldError("the field has nothing to select: all of it is transparent or deleted")
         return int(seen.element[np.argmin(((seen.points - point) ** 2).sum(axis=1))])

@@ -52,14 +52,16 @@ def values_of(edits: tuple[Edit, ...]) -> tuple[EditValues, ...]:
 
 @dataclass(frozen=True)
 class Shown:
-    """Content of an image: edits (see `values_of`), the scene's opacity choice, and isolated elements.
+    """Content of an image: edits (see `values_of`), the scene's opacity choice, elements that are shown.
 
-    With `isolated` elements the field has no others, and edits show no patches and no pastes.
+    With `isolated` elements the field has no others, and edits show no patches and no pastes. The field has
+    none of the `removed` elements.
     """
 
     edits: tuple[EditValues, ...]
     preserve_opacity: bool = True
     isolated: Selection | None = None
+    removed: Selection | None = None
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,8 @@ async def change_selection(coordinator: Coordinator, page: Page, message: messag
     """Follow a message about selected elements. Raises CagefieldError where it cannot be followed."""
     if isinstance(message, messages.Isolate):
         coordinator.session.isolate(message.on)
+    elif isinstance(message, messages.RemoveElements):
+        _remove(coordinator, message)
     elif isinstance(message, messages.SelectionCage):
         await _place_cage(coordinator, message)
     elif isinstance(message, messages.ChangeSelection):
@@ -41,6 +43,18 @@ async def change_selection(coordinator: Coordinator, page: Page, message: messag
         if not picked and message.mode == "replace":
             page.notice("info", "nothing there: the selection is empty")
         coordinator.session.pick(label, picked, message.mode)
+
+
+def _remove(coordinator: Coordinator, message: messages.RemoveElements) -> None:
+    if message.restore:
+        coordinator.session.restore_elements()
+        return
+    if coordinator.store.scene.original is not None:
+        raise CagefieldError(
+            "the scene has the NeRF that its voxels were baked from, of which nothing can be deleted; "
+            "delete with a cage (E, then Delete as its kind)"
+        )
+    coordinator.session.remove_elements()
 
 
 async def histogram_of(coordinator: Coordinator, attribute: messages.AttributeName) -> HistogramCounts:
