@@ -467,7 +467,10 @@ class Session:
     def _travel(self, step: Callable[[History[Document]], History[Document]]) -> None:
         self.drags.clear()
         self.preview = None
+        removed = self.document.removed
         self.history = step(self.history)
+        if self.document.removed != removed:
+            self.isolated = None
         if not self.document.has(self.selected):
             entries = self.document.entries
             self.selected = entries[-1].id if entries else None
