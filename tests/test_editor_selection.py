@@ -289,6 +289,7 @@ def test_the_selection_is_deleted_saved_and_restored(editor: EditorPage, server:
     other.ready()
     assert other.state["removed"]["count"] == count
     other.page.close()
+    editor.page.bring_to_front()
     editor.changed(lambda: editor.press("Control+s"))
     assert len(Scene.open(editor.state["path"]).field) == BALL + FLOOR - count
     editor.changed(lambda: editor.page.locator(".restore-deleted").click())
