@@ -337,7 +337,7 @@ export class Pointer {
 
   private place(event: MouseEvent): void {
     this.readPosition(event);
-    if (!this.firstPress.release) return;
+    if (!this.firstPress.release || event.altKey) return;
     const { width, height } = this.app.viewport.points;
     this.app.expectEdit();
     const at = { x: clamp(this.position.x / width), y: clamp(this.position.y / height) };
