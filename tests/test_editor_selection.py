@@ -254,3 +254,47 @@ def test_isolated_splats_alone_are_seen(editor: EditorPage) -> None:
     editor.until("!cagefield.now.state.isolated")
     editor.settle()
     assert shot(editor)[-75:-60, 60:-60].max() < 0.6
+
+
+def test_the_selection_becomes_a_lattice_or_a_mesh_by_one_key(editor: EditorPage) -> None:
+    middle, radius = ball_at(editor)
+    editor.press("j")
+    selected(editor, lambda: stroke(editor, around(middle, 0.9 * radius)))
+    for key, cage in (("Shift+E", "lattice"), ("Alt+e", "mesh")):
+        editor.changed(lambda key=key: editor.press(key))
+        assert editor.edit["cage"] == cage and editor.edit["kind"] == "continuous"
+        assert editor.edit["problem"] is None
+        editor.until("cagefield.now.mode === 'edit'")
+        editor.changed(lambda: editor.press("Control+z"))
+    editor.press("Escape", "Escape")
+
+
+def test_the_selection_is_deleted_saved_and_restored(editor: EditorPage, server: EditorServer) -> None:
+    middle, radius = ball_at(editor)
+
+    def red() -> int:
+        picture = shot(editor)
+        return int(((picture[..., 0] > 0.5) & (picture[..., 1] < 0.3)).sum())
+
+    before = red()
+    editor.press("j")
+    editor.page.locator(".selection .tp-lblv", has_text="Through all").locator("label").click()
+    count = selected(editor, lambda: stroke(editor, around(middle, 1.15 * radius)))
+    editor.page.locator(".selection .tp-lblv", has_text="Through all").locator("label").click()
+    editor.changed(lambda: editor.press("Delete"))
+    assert editor.state["removed"]["count"] == count and editor.state["selection"] is None
+    editor.settle()
+    assert red() < 0.05 * before
+    other = editor.tab(server.link)
+    other.ready()
+    assert other.state["removed"]["count"] == count
+    other.page.close()
+    editor.page.bring_to_front()
+    editor.changed(lambda: editor.press("Control+s"))
+    assert len(Scene.open(editor.state["path"]).field) == BALL + FLOOR - count
+    editor.changed(lambda: editor.page.locator(".restore-deleted").click())
+    editor.settle()
+    assert editor.state["removed"] is None and abs(red() - before) < 0.02 * before
+    editor.changed(lambda: editor.press("Control+s"))
+    assert len(Scene.open(editor.state["path"]).field) == BALL + FLOOR
+    editor.press("Escape", "Escape")

@@ -129,7 +129,7 @@ def test_other_picks(handlers: TaskHandlers) -> None:
 
 def test_the_box_is_around_the_selection_as_it_is_seen(handlers: TaskHandlers) -> None:
     ball = Selection.from_mask(np.arange(COUNT) < BALL)
-    box = Cage(np.array(answered(handlers, BoxTask(1, Shown(values_of((MOVED,))), ball, 0.0))))
+    box = answered(handlers, BoxTask(1, Shown(values_of((MOVED,))), ball, 0.0))
     np.testing.assert_allclose(box.center, (0.6, 0, 0), atol=0.02)
     lengths = np.linalg.norm(box.affine[0], axis=0)
     assert (lengths > 2.0 * BALL_RADIUS).all() and (lengths < 2.5 * BALL_RADIUS).all()

@@ -32,6 +32,8 @@ from cagefield.datasets import load_dataset
 from cagefield.datasets.sfm.transforms_writer import write_transforms
 from cagefield.images.image_files import write_png
 from cagefield.procedural import make_scene
+from cagefield.selection.element_selection import Selection
+from cagefield.selection.field_elements import elements_of_field
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from posed_photos import photos_alone
@@ -73,17 +75,32 @@ def _convert(folder: Path, say: Say) -> None:
 
 SESSION_STEPS = 9
 
+CHILD = """  - name: carried
+    parent: moved
+    adjustment: discrete
+    inner: {center: [0, 0, 0], size: 0.3}
+    operations: [{translate: [0.2, 0, 0]}]
+"""
+
 
 def _session(folder: Path, say: Say) -> None:
-    """An editor: names an edit n, keeps it, and says 2 n; at every third saves it and says 2 n + 1."""
-    scene = Scene.open(folder / "scene")
+    """An editor: names an edit n, keeps it, and says 2 n; at every third saves it and says 2 n + 1.
+
+    The edit carries another one, and n elements of the field are deleted.
+    """
+    scene = Scene.open(folder / "scene", whole=True)
     store = SceneStore(scene, folder / "scene")
     store.lock()
     session = Session(store.recovered() or store.document(), scene.field.bounds, scene.field.sample_spacing)
     if not session.document.entries:
-        session.load_edits(EDITS, False)
+        session.load_edits(EDITS + CHILD, False)
+    total = len(elements_of_field(scene.field))
     for number in range(1, SESSION_STEPS + 1):
         session.change(session.document.entries[0].id, name=f"n{number}")
+        if session.document.removed is not None:
+            session.restore_elements()
+        session.select_elements("Select", Selection.from_mask(np.arange(total) < number))
+        session.remove_elements()
         store.autosave(session)
         say(2 * number)
         if number % 3 == 0:
@@ -96,17 +113,21 @@ def _session_problem(folder: Path, said: int) -> str | None:
     problem = scene_problem(folder, 0)
     if problem is not None or said < 2:
         return problem
-    scene = Scene.open(folder / "scene")
+    scene = Scene.open(folder / "scene", whole=True)
     store = SceneStore(scene, folder / "scene")
     document = store.recovered() or store.document()
     names = [entry.edit.name for entry in document.entries]
     if not names or not names[0].startswith("n") or int(names[0][1:]) < said // 2:
         return f"lost: change {said // 2} was kept, {names} is there"
+    if document.entries[1].edit.parent != names[0]:
+        return f"lost: {names[0]} carries nothing"
+    if document.removed is None or f"n{document.removed.count}" != names[0]:
+        return f"lost: the deleted elements of {names[0]}"
     return None
 
 
 def _save_as(folder: Path, say: Say) -> None:
-    scene = Scene.open(folder / "scene")
+    scene = Scene.open(folder / "scene", whole=True)
     store = SceneStore(scene, folder / "scene")
     store.lock()
     session = Session(store.document(), scene.field.bounds, scene.field.sample_spacing)

@@ -29,6 +29,8 @@ export function edit(change: Partial<EditState> = {}): EditState {
     inner_pivot: [0, 0, 0],
     outer_pivot: [0, 0, 0],
     operations: [],
+    parent: null,
+    carrier: null,
     problem: null,
     ...change,
   };
@@ -50,6 +52,7 @@ export function state(change: Partial<State> = {}): State {
     keys: [],
     loop: false,
     selection: null,
+    removed: null,
     isolated: false,
     ...change,
   };

@@ -5,17 +5,20 @@ import { cageOverlay } from "../src/editing/cage_overlay";
 import { Drag } from "../src/editing/drag";
 import { asPointMove } from "../src/editing/gestures";
 import { apply, scaleOperation } from "../src/editing/operations";
-import { pickHandle } from "../src/editing/picking";
+import { pickHandle, pickNetLine } from "../src/editing/picking";
 import {
   cageLines,
   circle,
   curveWeight,
+  netLine,
   outermostPoints,
+  planeOf,
+  rowOf,
   steppedRadius,
   type Curve,
 } from "../src/editing/point_cages";
 import type { Corners, PointsState, Vec3 } from "../src/net/protocol";
-import { expectClose } from "./cages";
+import { box, expectClose } from "./cages";
 import { edit, state } from "./fake_server";
 
 const SHAPE: [number, number, number] = [2, 2, 3];
@@ -153,5 +156,38 @@ describe("control points on their own", () => {
       ],
     });
     expectClose(drag.shown.deformed.points![0], [8, 0, 0]);
+  });
+});
+
+describe("rows and planes of a lattice", () => {
+  const shape: [number, number, number] = [3, 2, 4];
+  const points = Array.from({ length: 24 }, (_, k): Vec3 => [
+    k % 3,
+    Math.floor(k / 3) % 2,
+    Math.floor(k / 6),
+  ]);
+  const lattice = { corners: box([1, 0.5, 1.5], [2, 1, 3]), pivot: [0, 0, 0] as Vec3, points, shape };
+
+  it("hold the points with the same other places", () => {
+    expect(rowOf(shape, { point: 7, axis: 0 })).toEqual([6, 7, 8]);
+    expect(rowOf(shape, { point: 7, axis: 2 })).toEqual([1, 7, 13, 19]);
+    expect(planeOf(shape, 7, 2)).toEqual([6, 7, 8, 9, 10, 11]);
+    expect(planeOf(shape, 7, 1)).toEqual([0, 1, 2, 6, 7, 8, 12, 13, 14, 18, 19, 20]);
+  });
+
+  it("are found from the lines that are drawn", () => {
+    cageLines(lattice).forEach(([from, to], place) => {
+      const line = netLine(lattice, place)!;
+      expect(points[line.point]).toEqual(from);
+      const row = rowOf(shape, line).map((k) => points[k]);
+      expect(row).toContainEqual(from);
+      expect(row).toContainEqual(to);
+      expect(row.length).toBe(shape[line.axis]);
+    });
+    expect(netLine({ corners: lattice.corners, pivot: [0, 0, 0] }, 0)).toBeNull();
+    const project = ([x, y, z]: Vec3) => ({ x: 100 * x, y: 100 * y, depth: 10 - z });
+    expect(pickNetLine(130, 2, lattice, project, 7)).toEqual({ point: 1, axis: 0 });
+    expect(pickNetLine(102, 60, lattice, project, 7)).toEqual({ point: 1, axis: 1 });
+    expect(pickNetLine(150, 50, lattice, project, 7)).toBeNull();
   });
 });

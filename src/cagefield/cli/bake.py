@@ -68,7 +68,9 @@ class Bake:
             self.baking,
             unbounded=scene.field.unbounded,
         )
-        dataclasses.replace(scene, field=baked.field).save(destination, overwrite=self.overwrite)
+        dataclasses.replace(scene, field=baked.field, removal=None).save(
+            destination, overwrite=self.overwrite
+        )
         print(f"{figures}\nscene written to {destination}")
 
 

@@ -75,7 +75,8 @@ def _title(edit: Edit) -> str:
         kind = f"continuous, {edit.shell.name} shell, {how}"
     else:
         kind = "discrete copy" if isinstance(edit, Copy) else "discrete move"
-    return f"{name}{kind}{_left_out(edit)}{hidden}"
+    carried = f', carried by "{edit.parent}"' if edit.parent else ""
+    return f"{name}{kind}{_left_out(edit)}{carried}{hidden}"
 
 
 def _left_out(edit: Edit) -> str:

@@ -55,8 +55,9 @@ class Select:
     """Select all others instead."""
     to_cage: Path | None = None
     """Write an edit file with a continuous edit whose inner cage is around the selection."""
-    cage: Literal["box", "mesh"] = "box"
-    """Shape of the cage of --to-cage: the least box, or a closed mesh around the selection."""
+    cage: Literal["box", "lattice", "mesh"] = "box"
+    """Shape of the cage of --to-cage: the least box, that box with a lattice of control points, or a closed
+    mesh around the selection."""
     faces: int = 240
     """Triangles of a mesh cage, at most."""
     margin: float | None = None
@@ -123,18 +124,13 @@ class Select:
 
     def _write_cage(self, elements: Elements, seen: DeformedPositions, mask: Mask, path: Path) -> None:
         from cagefield.edits import Edit, EditStack, save_edits
-        from cagefield.geometry.cage import Cage
-        from cagefield.selection.bounding_cages import oriented_box, outer_cage_of_box
-        from cagefield.selection.enclosing_mesh import mesh_cage_around
+        from cagefield.selection.selection_cages import cage_around, outer_cage_of_shape
 
         seen = seen.take(mask[seen.element])
         margin = elements.cell_edge if self.margin is None else self.margin
-        inner = oriented_box(seen.points, margin=margin, radii=elements.radii[seen.element])
-        outer = outer_cage_of_box(inner)
-        if self.cage == "mesh":
-            inner = mesh_cage_around(seen.points, margin, self.faces)
-            outer = outer_cage_of_box(Cage(inner.corners))
-        edit = Edit.continuous(inner, outer, name="selection")
+        radii = elements.radii[seen.element]
+        inner = cage_around(self.cage, seen.points, margin, radii, faces=self.faces)
+        edit = Edit.continuous(inner, outer_cage_of_shape(inner), name="selection")
         save_edits(EditStack([edit]), path)
         print(f"cage written to {path}; apply it after the scene's edits with `cagefield edit --append`")
 
@@ -147,5 +143,5 @@ class Select:
                 "delete with a cage (--to-cage), or bake voxels alone"
             )
         rest = without_elements(scene.field, elements, mask)
-        dataclasses.replace(scene, field=rest).save(out, self.overwrite)
+        dataclasses.replace(scene, field=rest, removal=None).save(out, self.overwrite)
         print(f"scene without them written to {out}")

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.edits import operations as ops
-from cagefield.edits.edit_names import problem_of_name, problem_of_source
+from cagefield.edits.edit_names import problem_of_name, problem_of_parent, problem_of_source
 from cagefield.edits.operation_sequence import ImpossibleOperationError, cages_along, problem_of_count
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import (
@@ -82,6 +82,7 @@ class SharedOptions(TypedDict):
 
     name: str
     enabled: bool
+    parent: str
     fill: Fill
     relight: Relight
     feather: float
@@ -97,6 +98,7 @@ class Edit(ABC):
     - operations: operations that move the inner cage, in order; `deformed` is the result.
     - name: name in lists and messages.
     - enabled: False hides the edit in a stack.
+    - parent: name of the edit that carries this one, see `chains`; "" for none.
     - fill: infill of the region that a move or a delete uncovers: "surroundings" continues the surface that
       the content stood on, "none" leaves the region as trained, a `Clone` copies a cage. Under a continuous
       edit that relights, "surroundings" fills where the light grows a lot.
@@ -115,13 +117,18 @@ class Edit(ABC):
     operations: tuple[Operation, ...] = ()
     name: str = ""
     enabled: bool = True
+    parent: str = ""
     fill: Fill = "surroundings"
     relight: Relight = "occlusion"
     feather: float = DEFAULT_FEATHER_VOXELS
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "operations", tuple(self.operations))
-        problem = problem_of_name(self.name) or problem_of_count(len(self.operations))
+        problem = (
+            problem_of_name(self.name)
+            or problem_of_parent(self.parent)
+            or problem_of_count(len(self.operations))
+        )
         if problem is not None:
             raise EditError(f"edit: {problem}")
         self._refuse(problem_of_infill(self.fill, self.relight, self.feather))
@@ -260,12 +267,29 @@ class Edit(ABC):
         """The edit with some fields changed; its kind stays."""
         return replace(self, **changes)
 
+    def parented_to(self: AnyEdit, parent: Edit | str) -> AnyEdit:
+        """The edit carried by another one of its stack, given by itself or by its name; "" for none.
+
+        Cages and operations of the edit stay where the parent's content is at rest; see `chains`. Raises
+        `EditError` for a parent without a name.
+        """
+        name = parent.name if isinstance(parent, Edit) else parent
+        if isinstance(parent, Edit) and not name:
+            raise self.error("its parent has no name; give it one, name=...")
+        return self.replace(parent=name)
+
+    @cached_property
+    def without_parent(self: AnyEdit) -> AnyEdit:
+        """The edit that nothing carries; itself where nothing does."""
+        return self.replace(parent="") if self.parent else self
+
     @property
     def shared_options(self) -> SharedOptions:
         """Fields that an edit of another kind takes over."""
         return {
             "name": self.name,
             "enabled": self.enabled,
+            "parent": self.parent,
             "fill": self.fill,
             "relight": self.relight,
             "feather": self.feather,

@@ -48,7 +48,8 @@
         operations:
           - move_point: {point: 12, by: [0, 0, 0.2]}    # a vertex
 
-Further keys of an edit: keep_source (discrete: copy instead of move), enabled, allow_folding. Lengths are
+Further keys of an edit: keep_source (discrete: copy instead of move), enabled, allow_folding, parent (the
+name of the edit that carries this one, see `chains`). Lengths are
 world units, angles degrees. `parse_edits(dump_edits(stack))` is the stack, bit for bit.
 """
 
@@ -71,6 +72,7 @@ from cagefield.edits.cage_nodes import (
     parse_inner,
     parse_outer,
 )
+from cagefield.edits.chains import problem_of_chains
 from cagefield.edits.edit import Continuous, Copy, Delete, Edit, ImpossibleEditError, Move, Paste
 from cagefield.edits.edit_names import problem_of_name, sanitize_name
 from cagefield.edits.file_nodes import Node
@@ -85,6 +87,27 @@ from cagefield.files.safe_open import read_text
 from cagefield.geometry.cage import Cage
 
 VERSION = 1
+_OPTIONAL_KEYS = (
+    "name",
+    "outer",
+    "operations",
+    "adjustment",
+    "shell",
+    "falloff",
+    "width",
+    "keep_source",
+    "delete",
+    "lattice",
+    "enabled",
+    "allow_folding",
+    "fill",
+    "relight",
+    "feather",
+    "source",
+    "parent",
+)
+"""Keys of an edit beside `inner`."""
+
 MAX_EDITS = 500
 """Edits of a file: each takes a millisecond to be checked."""
 
@@ -120,8 +143,8 @@ def parse_edits(
 ) -> EditStack:
     """The edit stack of a text, format "yaml" or "json"; `source` names it in errors.
 
-    Enabled edits are checked (`Edit.check`) unless check=False; `mend` as for `load_edits`. Mesh files that
-    the text names are relative to `folder`; without one, none is read.
+    Enabled edits are checked (`Edit.check`) unless check=False, parents with check or mend; `mend` as for
+    `load_edits`. Mesh files that the text names are relative to `folder`; without one, none is read.
     """
     yaml = format == "yaml"
     root = file_nodes.read_yaml(text, source, halves=mend) if yaml else file_nodes.read_json(text, source)
@@ -140,6 +163,9 @@ def _stack(node: Node, check: bool, mend: bool, folder: Path | None) -> EditStac
     if len(items) > MAX_EDITS:
         raise node.error(f"{len(items)} edits are too many, a file has at most {MAX_EDITS}; leave some out")
     edits = [_edit(item, check, mend, folder) for item in items]
+    if (check or mend) and (fault := problem_of_chains(edits)) is not None:
+        keys = items[fault[0]].mapping(required=("inner",), optional=_OPTIONAL_KEYS)
+        raise keys["parent"].error(fault[1])
     shown = (edit.kernel_lattice for edit in edits if edit.enabled and isinstance(edit, Continuous))
     if (problem := problem_of_lattices(shown)) is not None:
         if not mend:
@@ -180,24 +206,7 @@ def dump_edits(stack: EditStack, *, format: str = "yaml") -> str:
 def _edit(node: Node, check: bool, mend: bool, folder: Path | None) -> Edit:
     keys = node.mapping(
         required=("inner",),
-        optional=(
-            "name",
-            "outer",
-            "operations",
-            "adjustment",
-            "shell",
-            "falloff",
-            "width",
-            "keep_source",
-            "delete",
-            "lattice",
-            "enabled",
-            "allow_folding",
-            "fill",
-            "relight",
-            "feather",
-            "source",
-        ),
+        optional=_OPTIONAL_KEYS,
     )
     inner = parse_inner(keys["inner"], folder)
     outer = None if "outer" not in keys or keys["outer"].is_null else parse_outer(keys["outer"], inner)
@@ -208,6 +217,8 @@ def _edit(node: Node, check: bool, mend: bool, folder: Path | None) -> Edit:
         options["relight"] = _relight(keys["relight"])
     if "name" in keys:
         options["name"] = _name(keys["name"], mend)
+    if "parent" in keys and not keys["parent"].is_null:
+        options["parent"] = _name(keys["parent"], mend)
     if "enabled" in keys:
         options["enabled"] = keys["enabled"].boolean()
     if "feather" in keys:
@@ -325,6 +336,8 @@ def _name(node: Node, mend: bool) -> str:
 
 def _from_edit(edit: Edit) -> dict[str, Any]:
     content: dict[str, Any] = {"name": edit.name} if edit.name else {}
+    if edit.parent:
+        content["parent"] = edit.parent
     settings = edit.shell_settings
     if isinstance(edit, Delete):
         content["delete"] = True

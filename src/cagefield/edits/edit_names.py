@@ -27,6 +27,14 @@ def problem_of_name(name: object) -> str | None:
     return None
 
 
+def problem_of_parent(parent: object) -> str | None:
+    """Why an edit may not have a parent of that name, and the cure; None where it may."""
+    if not isinstance(parent, str):
+        return f'parent must be the name of an edit, or "", got {type(parent).__name__}'
+    problem = problem_of_name(parent)
+    return None if problem is None else problem.replace("the name", "the name of its parent", 1)
+
+
 def problem_of_source(source: object) -> str | None:
     """Error text, with the cure, for a paste's source that is no path; None for a path."""
     if not isinstance(source, str) or not source.strip():

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import SupportsIndex
 
+from cagefield.edits.chains import resolved_edits
 from cagefield.edits.edit import Continuous, Edit
 from cagefield.edits.edit_map import EditMap
 from cagefield.edits.options import problem_of_lattices
@@ -32,7 +33,7 @@ class EditStack(EditMap):
     """Edits e_1 ... e_n: the deformed field of e_k is the canonical field of e_(k+1).
 
     A sample goes through phi_n first and phi_1 last. Edits that are not enabled, or change nothing, are
-    passed over.
+    passed over. Edits with a parent are applied directly before it (`chains`), wherever they are listed.
     """
 
     edits: tuple[Edit, ...] = ()
@@ -53,9 +54,20 @@ class EditStack(EditMap):
         return self.edits[number]
 
     @property
+    def resolved(self) -> tuple[Edit, ...]:
+        """All edits in the order of application, without parents (`chains.resolved_edits`).
+
+        Raises `EditError` for a parent that is missing, ambiguous, a paste or in a circle.
+        """
+        return resolved_edits(self.edits)
+
+    @property
     def active(self) -> tuple[Edit, ...]:
-        """The edits that are enabled and change something, in order."""
-        return tuple(edit for edit in self.edits if edit.enabled and edit.changes_anything)
+        """The edits that are enabled and change something, in the order of application.
+
+        Raises `EditError` as `resolved` does.
+        """
+        return tuple(edit for edit in self.resolved if edit.enabled and edit.changes_anything)
 
     @property
     def steps(self) -> tuple[PreparedEdit, ...]:
@@ -101,7 +113,8 @@ class EditStack(EditMap):
         return tuple(errors)
 
     def check(self) -> None:
-        """Raise `EditError` for the first active edit that cannot be evaluated, or too large lattices."""
+        """Raise `EditError` for the first active edit that cannot be evaluated, for too large lattices, and
+        for parents that are not possible."""
         too_large = problem_of_lattices(
             edit.kernel_lattice for edit in self.edits if edit.enabled and isinstance(edit, Continuous)
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from cagefield.cameras.keyframes import Keyframe, Timeline
 from cagefield.completion.patcher import Patcher, PatchStage
 from cagefield.edits import Continuous, Delete, EditStack, PreparedEdit, PreparedStack
+from cagefield.edits.chains import application_order
 from cagefield.edits.partial_edit import partial_edit
 from cagefield.edits.patch import Patch, SplatPatch
 from cagefield.errors import EditError
@@ -75,6 +76,7 @@ def path_edits(
     """
     if len(keys) < 2:
         return None
+    edits, keys = in_application_order(edits, keys)
     line = Timeline(keys, loop=loop)
     times = state_times(line, edits, MOST_STATES)
     if times is None:
@@ -116,6 +118,20 @@ def path_edits(
     )
     off = np.concatenate(errors) if errors else np.zeros(1)
     return PathEdits(data, len(unique), nodes, (float(off.mean()), float(np.percentile(off, 99))))
+
+
+def in_application_order(edits: EditStack, keys: Sequence[Keyframe]) -> tuple[EditStack, list[Keyframe]]:
+    """The stack in the order of application, without parents, and keyframes whose parts have its numbers.
+
+    Parts of edits that are not in the stack are left out: nothing shows them. Raises EditError for parents
+    that are not possible.
+    """
+    numbers = {old + 1: new for new, old in enumerate(application_order(edits.edits), start=1)}
+    renumbered = [
+        replace(key, parts={numbers[old]: part for old, part in key.parts.items() if old in numbers})
+        for key in keys
+    ]
+    return EditStack(edits.resolved), renumbered
 
 
 Parts = tuple[float, ...]

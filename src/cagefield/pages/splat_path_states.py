@@ -12,7 +12,14 @@ from cagefield.completion.patcher import Patcher, PatchStage
 from cagefield.edits import EditStack, PreparedStack
 from cagefield.fields.splat_field import SplatField
 from cagefield.pages.page_splat_path import SPLAT_BYTES, SplatPathState, encode_page_splat_path
-from cagefield.pages.path_states import MOST_STATES, PathEdits, parts_at, stack_at, state_times
+from cagefield.pages.path_states import (
+    MOST_STATES,
+    PathEdits,
+    in_application_order,
+    parts_at,
+    stack_at,
+    state_times,
+)
 from cagefield.rendering.splats.raster_splats import changed_splats
 from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.splats.splitting import Split, split_of
@@ -38,6 +45,7 @@ def splat_path_edits(
     if len(keys) < 2:
         return None
 
+    edits, keys = in_application_order(edits, keys)
     on_way = patcher.prepare(edits.edits, stage=PatchStage.INPAINTED)
     whole = patcher.prepare(edits.edits, relight_continuous=False)
     # With all that is pasted, also in states without it.

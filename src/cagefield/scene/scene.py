@@ -41,7 +41,7 @@ from cagefield.edits import EditStack, LatticeError, Paste, PreparedStack
 from cagefield.edits.edit_files import dump_edits, load_edits
 from cagefield.edits.paste_paths import rebased
 from cagefield.edits.paste_placement import placed_paste
-from cagefield.errors import SceneError
+from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.frusta import in_frusta
 from cagefield.fields.nerf_field import NerfField
 from cagefield.fields.nerf_file import load_nerf, save_nerf
@@ -51,6 +51,7 @@ from cagefield.files.atomic import replaced_file, replaced_folder
 from cagefield.files.safe_open import real_path
 from cagefield.images.render_result import Background, RenderResult, background_rgb
 from cagefield.scene.paste_sources import SceneSources
+from cagefield.scene.removed_elements import Removal, dump_removed, read_removed, without_removed
 from cagefield.scene.scene_files import (
     CAMERAS,
     EDITS,
@@ -59,6 +60,7 @@ from cagefield.scene.scene_files import (
     FORMAT,
     MANIFEST,
     ORIGINAL,
+    REMOVED,
     VERSION,
     check_destination,
     check_part,
@@ -102,6 +104,7 @@ class Scene:
     opened from: sources of pastes are relative to that, or to the working directory where it is None.
     `source_to_world` [4,4] maps the coordinates of the reconstruction that the cameras came from to the
     scene's (`Dataset.source_to_world`); the identity where they are the same or nothing is known.
+    `removal` has the whole field, which is what is saved, where `field` is without deleted elements.
 
     Raises:
         CagefieldError: a background outside [0, 1].
@@ -119,6 +122,7 @@ class Scene:
     preserve_opacity: bool = True
     folder: Path | None = None
     source_to_world: Array = dataclasses.field(default_factory=partial(np.eye, 4))
+    removal: Removal | None = None
 
     def __post_init__(self) -> None:
         cameras = {str(split): tuple(members) for split, members in self.cameras.items()}
@@ -200,8 +204,10 @@ class Scene:
         return cls(voxels, cameras=cameras, background=background, original=kept)
 
     @classmethod
-    def open(cls, path: Path | str) -> Scene:
+    def open(cls, path: Path | str, *, whole: bool = False) -> Scene:
         """The scene in the folder `path`; edits that cannot be evaluated are an error when it is rendered.
+
+        Its field is without the elements that were deleted in the editor, `whole` with them.
 
         Raises:
             SceneError: the folder or one of its files is missing, damaged or of a newer version; the message
@@ -217,7 +223,14 @@ class Scene:
             check_part(folder / name)
         cameras = read_cameras(folder / CAMERAS)
         edits = load_edits(folder / EDITS, check=False, mend=True)
-        field = read_field(folder / FIELD)
+        field, removed = read_field(folder / FIELD), None if whole else read_removed(folder)
+        removal = None
+        if removed is not None:
+            try:
+                removal, field = Removal(field, removed), without_removed(field, removed)
+            except CagefieldError as error:
+                cure = "remove the file to restore all elements"
+                raise SceneError(f"{folder / REMOVED}: {error!s:.200}; {cure}") from None
         original = load_nerf(folder / ORIGINAL) if (folder / ORIGINAL).exists() else None
         try:
             return cls(
@@ -230,6 +243,7 @@ class Scene:
                 preserve_opacity=preserve_opacity,
                 folder=folder.absolute(),
                 source_to_world=np.eye(4) if source_to_world is None else source_to_world,
+                removal=removal,
             )
         except SceneError as error:
             raise SceneError(f"{folder / MANIFEST}: {error}") from None
@@ -255,7 +269,9 @@ class Scene:
             for name, text in beside.items():
                 if text is not None:
                     (draft / name).write_text(text, encoding="utf-8")
-            self.field.save(draft / FIELD)
+            (self.field if self.removal is None else self.removal.field).save(draft / FIELD)
+            if self.removal is not None:
+                (draft / REMOVED).write_text(dump_removed(self.removal.selection), encoding="utf-8")
             if self.original is not None:
                 save_nerf(self.original, draft / ORIGINAL)
             edits = EditStack(rebased(self.edits, self.folder, target))
@@ -401,7 +417,7 @@ class Scene:
         from cagefield.rendering.nerf.nerf_renderer import NerfRenderer
 
         # Patches are voxels: too rough for what a continuous edit bends, and for parts with soft seams.
-        edits = [edit.replace(feather=0.0) if edit.feather else edit for edit in self.edits]
+        edits = [edit.replace(feather=0.0) if edit.feather else edit for edit in self.edits.resolved]
         exact = self.patcher.prepare(edits, relight_continuous=False).without_lattices()
         return NerfRenderer(original, exact, self.preserve_opacity)
 
@@ -442,8 +458,11 @@ class Scene:
 
     @property
     def prepared_edits(self) -> PreparedStack:
-        """The edits with the patches that they ask for. Raises EditError for a paste that is not possible."""
-        return self.patcher.prepare(self.edits.edits, preserve_opacity=self.preserve_opacity)
+        """The edits in the order of application, with the patches that they ask for.
+
+        Raises EditError for a paste or a parent that is not possible.
+        """
+        return self.patcher.prepare(self.edits.resolved, preserve_opacity=self.preserve_opacity)
 
     @cached_property
     def up(self) -> Array:

@@ -28,8 +28,8 @@ FORMAT = "cagefield-scene"
 VERSION = 1
 
 FIELD, EDITS, CAMERAS, MANIFEST = "field.safetensors", "edits.yaml", "cameras.json", "scene.json"
-ORIGINAL = "original.safetensors"
-FILES = (FIELD, ORIGINAL, EDITS, CAMERAS, MANIFEST)
+ORIGINAL, REMOVED = "original.safetensors", "removed.json"
+FILES = (FIELD, ORIGINAL, REMOVED, EDITS, CAMERAS, MANIFEST)
 
 
 def check_destination(path: Path | str, overwrite: bool) -> Path:

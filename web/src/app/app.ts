@@ -1,6 +1,7 @@
 /** The editor: its parts, connected to each other, to the server's messages and to the canvas. */
 import { Vector3 } from "three";
-import { cageOverlay, shownCages } from "../editing/cage_overlay";
+import { cageOverlay, restCages, shownCages } from "../editing/cage_overlay";
+import { carrierRotation, carryPoint } from "../editing/carrier";
 import { Drag, targetCage } from "../editing/drag";
 import { Gizmo } from "../editing/gizmo";
 import { Grid } from "../editing/grid";
@@ -197,7 +198,7 @@ export class App {
     this.viewport.invalidate();
   }
 
-  /** Switches to Set mode, of control points to Edit mode, as soon as the requested new edit arrives. */
+  /** Switches to Set mode, of a cage with control points to Edit mode, as soon as the requested new edit arrives. */
   expectEdit(): void {
     this.lastEditId = Math.max(0, ...(this.store.now.state?.edits.map((edit) => edit.id) ?? []));
   }
@@ -218,7 +219,8 @@ export class App {
     const { now } = this.store;
     const edit = selectedEdit(now);
     const eye = this.viewport.camera.position.toArray();
-    const grid = now.grid && edit !== null ? this.grid.linesFor(edit, shownCages(edit, this.drag)) : [];
+    const lines = now.grid && edit !== null ? this.grid.linesFor(edit, restCages(edit, this.drag)) : [];
+    const grid = lines.map((line) => line.map((point) => carryPoint(edit?.carrier ?? null, point)));
     const { segments, dots } = cageOverlay(now, this.drag, grid, eye, this.viewport.forward.toArray());
     this.lines.set(segments);
     this.handles.set(dots);
@@ -232,7 +234,7 @@ export class App {
     }
     const cage = targetCage(shownCages(edit, this.drag), dragTarget(now));
     if (this.gizmo.dragging) this.gizmo.moveTo(this.gizmoPosition ?? new Vector3(...cage.pivot));
-    else this.gizmo.show(now.tool, now.axes, cage, this.gizmoPosition);
+    else this.gizmo.show(now.tool, now.axes, cage, this.gizmoPosition, carrierRotation(edit.carrier));
   }
 
   /** The cages of an edit as they are drawn, a drag in progress included. */
@@ -301,8 +303,8 @@ export class App {
     this.store.set({ state, ...(isOther || hasOtherHandles ? { corners: [], hover: null } : {}) });
     if (isExpected) {
       this.lastEditId = null;
-      const isOfPoints = selectedEdit(this.store.now)?.cage === "points";
-      this.store.set({ mode: isOfPoints ? "edit" : "set", cage: "inner" });
+      const hasPoints = selectedEdit(this.store.now)?.cage !== "box";
+      this.store.set({ mode: hasPoints ? "edit" : "set", cage: "inner" });
     }
   }
 

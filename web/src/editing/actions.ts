@@ -3,7 +3,16 @@ import { halfExtent } from "./cage";
 import { targetCage } from "./drag";
 import { middleOf } from "./point_cages";
 import type { App } from "../app/app";
-import type { ChangeSelection, Command, EditState, Mirror, Place, Subdivide, Vec3 } from "../net/protocol";
+import type {
+  ChangeSelection,
+  Command,
+  EditState,
+  Mirror,
+  Place,
+  SelectionCage,
+  Subdivide,
+  Vec3,
+} from "../net/protocol";
 import { isSplatFile, uploadAddress, uploadFile } from "../net/upload";
 import { isFirstUse } from "../app/session_storage";
 import {
@@ -64,12 +73,31 @@ export class Actions {
     this.app.send({ type: "isolate", on: this.app.store.now.state?.isolated !== true });
   }
 
-  /** Makes an edit whose inner cage holds the selected elements; `margin` in cells. */
-  encloseSelection(margin?: number): void {
+  /** Deletes the selected elements from the field. */
+  removeElements(): void {
+    if (this.app.store.now.state?.selection == null)
+      return this.app.say("nothing is selected: paint with the brush (M), or drag a lasso (J)", "warning");
+    this.app.send({ type: "remove_elements" });
+  }
+
+  /** Restores all deleted elements. */
+  restoreElements(): void {
+    this.app.send({ type: "remove_elements", restore: true });
+  }
+
+  /** Deletes the selected elements with a tool that selects them in hand, else the selected edit. */
+  remove(): void {
+    const { selecting, state } = this.app.store.now;
+    if (selecting !== null && state?.selection != null) this.removeElements();
+    else this.removeSelected();
+  }
+
+  /** Makes an edit whose inner cage, of a shape, holds the selected elements; `margin` in cells. */
+  encloseSelection(cage: NonNullable<SelectionCage["cage"]> = "box", margin?: number): void {
     if (this.app.store.now.state?.selection == null)
       return this.app.say("nothing is selected: paint with the brush (M), or drag a lasso (J)", "warning");
     this.app.expectEdit();
-    this.app.send({ type: "selection_cage", ...(margin === undefined ? {} : { margin }) });
+    this.app.send({ type: "selection_cage", cage, ...(margin === undefined ? {} : { margin }) });
   }
 
   setMode(mode: Editor["mode"]): void {

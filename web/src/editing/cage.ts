@@ -69,7 +69,12 @@ export function edgeDirections(corners: Corners): Matrix3 {
 
 /** The rotation closest to the edge directions: the orthogonal factor of their polar decomposition. */
 export function nearestRotation(corners: Corners): Quaternion {
-  let q = edgeDirections(corners);
+  return orthogonalFactor(edgeDirections(corners));
+}
+
+/** The orthogonal factor of the polar decomposition of a matrix with a positive determinant. */
+export function orthogonalFactor(matrix: Matrix3): Quaternion {
+  let q = matrix;
   for (let step = 0; step < 60; step++) {
     const next = q.clone().invert().transpose();
     let change = 0;

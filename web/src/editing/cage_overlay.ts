@@ -1,6 +1,7 @@
 /** Lines and handles of all cages for the state of the editor. */
 import type { Color } from "three";
 import { EDGES, partCorners, type CagePart, type Posed } from "./cage";
+import { carryCages } from "./carrier";
 import { areSimilarCages, cagesOf, targetCage, type Cages, type Drag } from "./drag";
 import type { Dot } from "./handles";
 import { color, type Segment } from "./lines";
@@ -35,8 +36,13 @@ const HOVER: Stroke = { width: 4, alpha: 1, hiddenAlpha: 0.9 };
 const WHITE = color("#ffffff");
 const GHOST_COLOR = color("#c9ced6");
 
-/** The cages of an edit as they are drawn: those of the drag of this edit, if any. */
+/** The cages of an edit as they are drawn: those of the drag of this edit, if any, where its parents carry them. */
 export function shownCages(edit: EditState, drag: Drag | null): Cages {
+  return carryCages(edit.carrier, restCages(edit, drag));
+}
+
+/** The cages of an edit at rest: those of the drag of this edit, if any. */
+export function restCages(edit: EditState, drag: Drag | null): Cages {
   return drag?.edit.id === edit.id ? drag.shown : cagesOf(edit);
 }
 

@@ -49,13 +49,16 @@ export class Gizmo {
     scene.add(this.proxy, this.controls.getHelper());
   }
 
-  /** Shows the gizmo at a position, by default the cage's pivot, along the world's or the cage's axes. */
-  show(tool: Tool, axes: Axes, cage: Posed, at: Vector3 | null): void {
+  /**
+   * Shows the gizmo at a position, by default the cage's pivot, along the axes of the world, which `turn` carries, or of
+   * the cage.
+   */
+  show(tool: Tool, axes: Axes, cage: Posed, at: Vector3 | null, turn = new Quaternion()): void {
     if (this.dragging) return;
     this.axes = axes;
     this.controls.mode = at !== null || tool === "select" ? "translate" : tool;
     this.proxy.position.copy(at ?? new Vector3(...cage.pivot));
-    this.proxy.quaternion.copy(axes === "cage" ? nearestRotation(cage.corners) : new Quaternion());
+    this.proxy.quaternion.copy(axes === "cage" ? nearestRotation(cage.corners) : turn);
     this.proxy.scale.set(1, 1, 1);
     this.proxy.updateMatrixWorld();
     if (!this.isShown) this.controls.attach(this.proxy);

@@ -96,8 +96,26 @@ export function bindings(
     {
       group: "Selection",
       keys: ["E"],
-      action: "Enclose the selection in a new cage",
+      action: "Enclose the selection in a new cage: a box",
       run: () => actions.encloseSelection(),
+    },
+    {
+      group: "Selection",
+      keys: ["Shift+E"],
+      action: "Enclose it in a lattice of control points",
+      run: () => actions.encloseSelection("lattice"),
+    },
+    {
+      group: "Selection",
+      keys: ["Alt+E"],
+      action: "Enclose it in a closed mesh",
+      run: () => actions.encloseSelection("mesh"),
+    },
+    {
+      group: "Selection",
+      keys: ["Ctrl+Delete"],
+      action: "Delete the selected elements",
+      run: () => actions.removeElements(),
     },
     {
       group: "Selection",
@@ -119,7 +137,12 @@ export function bindings(
       run: () => actions.toggleShadows(),
     },
     { group: "Edits", keys: ["H"], action: "Hide or show", run: () => actions.toggleEnabled() },
-    { group: "Edits", keys: ["Delete", "Backspace"], action: "Remove", run: () => actions.removeSelected() },
+    {
+      group: "Edits",
+      keys: ["Delete", "Backspace"],
+      action: "Remove the edit; with a selecting tool, delete the selected elements",
+      run: () => actions.remove(),
+    },
     { group: "Edits", keys: ["Ctrl+D"], action: "Duplicate", run: () => actions.duplicate() },
     { group: "Edits", keys: ["Ctrl+C"], action: "Copy as text; Ctrl+V pastes", run: () => actions.copy() },
     { group: "Edits", keys: ["Shift+V"], action: "Paste from another scene", run: () => dialogs.paste() },
@@ -181,6 +204,7 @@ export const MOUSE_BINDINGS: { keys: string[]; action: string }[] = [
     action: "While dragging points: radius of proportional editing",
   },
   { keys: ["Shift+click"], action: "Choose corners, edges, faces or control points to drag together" },
+  { keys: ["Alt+click"], action: "Choose a row of a lattice's points; with Ctrl a plane; Shift adds" },
   { keys: ["Shift+drag"], action: "Beside the cages: select in a rectangle" },
   {
     keys: ["Shift", "Ctrl"],

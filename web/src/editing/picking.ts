@@ -1,6 +1,6 @@
 /** Parts of cages under a pixel of the screen. */
 import { EDGES, FACES, faceNormal, centroid, type CagePart, type Posed } from "./cage";
-import { cageLines, handlesOf } from "./point_cages";
+import { cageLines, handlesOf, netLine, type NetLine } from "./point_cages";
 import type { Corners, Vec3 } from "../net/protocol";
 
 export interface ScreenPoint {
@@ -73,6 +73,21 @@ export function visibleFaceCenters(corners: Corners, eye: Vec3): (Vec3 | null)[]
     const facing = normal.reduce((sum, n, i) => sum + n * (eye[i] - center[i]), 0) > 0;
     return facing ? center : null;
   });
+}
+
+/** The line of a lattice's net nearest to pixel (x, y), within a distance in pixels; null for none. */
+export function pickNetLine(
+  x: number,
+  y: number,
+  cage: Posed,
+  project: Project,
+  reach: number,
+): NetLine | null {
+  const distances = cageLines(cage).map(
+    ([from, to]) => segmentDistance(project(from), project(to), x, y)?.distance ?? Infinity,
+  );
+  const least = Math.min(...distances);
+  return least <= reach ? netLine(cage, distances.indexOf(least)) : null;
 }
 
 /** Distance in pixels from (x, y) to the closest line, or control point, of a cage on the screen. */

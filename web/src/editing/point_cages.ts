@@ -60,6 +60,53 @@ export function outermostPoints([nx, ny, nz]: readonly [number, number, number])
   );
 }
 
+/** A line of a lattice's net: one of its points, and its axis. */
+export interface NetLine {
+  point: number;
+  axis: 0 | 1 | 2;
+}
+
+/** The line at a place in `cageLines` of a lattice. */
+export function netLine(cage: Posed, place: number): NetLine | null {
+  const { points, shape } = cage;
+  if (points === undefined || !shape) return null;
+  let n = 0;
+  for (let point = 0; point < points.length; point++) {
+    const at = placeOf(point, shape);
+    for (const axis of [0, 1, 2] as const) {
+      if (at[axis] + 1 < shape[axis] && n++ === place) return { point, axis };
+    }
+  }
+  return null;
+}
+
+/** Numbers of the points of a lattice on a line of its net, from end to end. */
+export function rowOf(shape: Shape, { point, axis }: NetLine): number[] {
+  return pointsWhere(shape, (at, here) => at.every((n, other) => other === axis || n === here[other]), point);
+}
+
+/** Numbers of the points of a lattice that have the place of a point along an axis: a plane across it. */
+export function planeOf(shape: Shape, point: number, across: number): number[] {
+  return pointsWhere(shape, (at, here) => at[across] === here[across], point);
+}
+
+type Shape = readonly [number, number, number];
+
+function placeOf(point: number, [nx, ny]: Shape): [number, number, number] {
+  return [point % nx, Math.floor(point / nx) % ny, Math.floor(point / (nx * ny))];
+}
+
+function pointsWhere(
+  shape: Shape,
+  isWanted: (at: number[], here: number[]) => boolean,
+  point: number,
+): number[] {
+  const here = placeOf(point, shape);
+  return Array.from({ length: shape[0] * shape[1] * shape[2] }, (_, k) => k).filter((k) =>
+    isWanted(placeOf(k, shape), here),
+  );
+}
+
 /** Weight of a point at a distance from the closest moved one: 1 at 0, and 0 from the radius on. */
 export function curveWeight(distance: number, { radius, curve }: Proportional): number {
   const g = Math.min(1, Math.max(0, 1 - distance / radius));

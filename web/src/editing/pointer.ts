@@ -1,12 +1,13 @@
 /** Mouse input of the canvas; precedence: corners, gizmo, faces and edges, then the view. */
 import { Plane, Vector3 } from "three";
-import { partCorners, halfExtent, faceNormal, type CagePart } from "./cage";
+import { FACES, centroid, partCorners, halfExtent, faceNormal, type CagePart, type Posed } from "./cage";
 import type { App } from "../app/app";
+import { operationAtRest } from "./carrier";
 import { targetCage } from "./drag";
 import { asPointMove, moveCornersBy, closestPointOnLine, intersectPlane } from "./gestures";
 import { snapLength, snapOperation, type Operation } from "./operations";
-import { distanceToCage, pickHandle, pickPart } from "./picking";
-import { middleOf, steppedRadius, type Proportional } from "./point_cages";
+import { distanceToCage, pickHandle, pickNetLine, pickPart } from "./picking";
+import { middleOf, planeOf, rowOf, steppedRadius, type NetLine, type Proportional } from "./point_cages";
 import { draggableCages, shownCages } from "./cage_overlay";
 import { dragObstacle, selectedEdit, showsCages, dragTarget, type Hover } from "../app/store";
 
@@ -90,10 +91,11 @@ export class Pointer {
   /** Applies the mouse's position to the drag again, after a change of snapping or constraint. */
   applyMotion(): void {
     if (this.hold === null) return;
-    const raw = this.operation(this.hold);
+    const carried = this.operation(this.hold);
     const { drag } = this.app;
     this.appliedAt = { ...this.position };
-    if (raw === null || drag === null) return;
+    if (carried === null || drag === null) return;
+    const raw = operationAtRest(drag.edit.carrier, carried);
     const cage = targetCage(drag.start, drag.target);
     this.app.moveDrag(asPointMove(this.snap(raw), cage, this.proportional), this.latestEvent.time);
   }
@@ -158,7 +160,8 @@ export class Pointer {
       this.hold = null;
       this.app.endDrag();
     } else if (this.pressed && event.button === 0 && this.travelPixels() < MAX_CLICK_PIXELS) {
-      this.select();
+      if (event.altKey) this.chooseRow(event);
+      else this.select();
     }
     this.free();
     this.updateHover();
@@ -240,7 +243,7 @@ export class Pointer {
     const drag = this.app.beginDrag(now.mode === "edit" ? "field" : hover.cage);
     if (drag === null) return;
     if (!together && now.corners.length > 0) this.app.store.set({ corners: [] });
-    const cage = targetCage(drag.start, drag.target);
+    const cage = targetCage(shownCages(drag.edit, drag), drag.target);
     const at = new Vector3(...middleOf(cage, own));
     const line =
       hover.part.kind === "face" && !together
@@ -284,6 +287,34 @@ export class Pointer {
     return snapOperation(operation, { length: step, angle: SNAP_ANGLE_DEG, factor: SNAP_FACTOR });
   }
 
+  /** Chooses the row of a lattice's points on the clicked line, or with Ctrl the plane that faces the view most. */
+  private chooseRow(event: PointerEvent): void {
+    const { now } = this.app.store;
+    const edit = selectedEdit(now);
+    if (edit === null || !showsCages(now) || dragObstacle(now, edit) !== null) return;
+    const cage = targetCage(shownCages(edit, this.app.drag), dragTarget(now));
+    const { x, y } = this.position;
+    const line = pickNetLine(x, y, cage, this.app.viewport.project, LINE_RADIUS_PIXELS);
+    if (line === null || !cage.shape || cage.points === undefined) return;
+    const { shape } = cage;
+    const isPlane = event.ctrlKey || event.metaKey;
+    const row = isPlane ? planeOf(shape, line.point, this.facingAxis(cage, line)) : rowOf(shape, line);
+    const corners = event.shiftKey ? [...new Set([...now.corners, ...row])].sort((a, b) => a - b) : row;
+    this.app.store.set({ corners });
+  }
+
+  /** The axis across the plane, through a line of a lattice's net, that faces the view most. */
+  private facingAxis(cage: Posed, { axis }: NetLine): number {
+    const forward = this.app.viewport.forward;
+    const facing = (across: number): number => {
+      const [first, last] = [2 * across, 2 * across + 1].map((face) => FACES[face]);
+      const from = new Vector3(...centroid(cage.corners, first));
+      return Math.abs(new Vector3(...centroid(cage.corners, last)).sub(from).normalize().dot(forward));
+    };
+    const [a, b] = [0, 1, 2].filter((other) => other !== axis);
+    return facing(a) >= facing(b) ? a : b;
+  }
+
   /** Selects the edit whose cage was clicked. */
   private select(): void {
     const { now } = this.app.store;
@@ -306,7 +337,7 @@ export class Pointer {
 
   private place(event: MouseEvent): void {
     this.readPosition(event);
-    if (!this.firstPress.release) return;
+    if (!this.firstPress.release || event.altKey) return;
     const { width, height } = this.app.viewport.points;
     this.app.expectEdit();
     const at = { x: clamp(this.position.x / width), y: clamp(this.position.y / height) };

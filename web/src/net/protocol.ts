@@ -48,6 +48,7 @@ export type PageMessage =
   | ChangeSelection
   | SelectionCage
   | Isolate
+  | RemoveElements
   | PlacePoint
   | Subdivide
   | PointReach;
@@ -215,6 +216,10 @@ export interface Change {
    * 0: exact
    */
   lattice?: number | null;
+  /**
+   * the edit that carries this one; 0: none
+   */
+  parent?: number | null;
 }
 /**
  * Selects all or none, inverts the selection, or grows or shrinks it by a cell.
@@ -440,6 +445,13 @@ export interface PresentedMessage {
   picture: number;
 }
 /**
+ * Deletes the selected elements from the field, or restores all that were deleted.
+ */
+export interface RemoveElements {
+  type: "remove_elements";
+  restore?: boolean;
+}
+/**
  * Renders the test views to PNGs in a folder, or the camera path to an MP4; in the background.
  */
 export interface RenderJob {
@@ -518,10 +530,13 @@ export interface SelectRegion {
   tolerance?: number;
 }
 /**
- * A new edit with an inner cage around the selected elements as they are seen, an oriented box.
+ * A new edit with an inner cage around the selected elements as they are seen.
+ *
+ * A "box" is oriented, a "lattice" that box divided into cells near to cubes, a "mesh" closed and decimated.
  */
 export interface SelectionCage {
   type: "selection_cage";
+  cage?: "box" | "lattice" | "mesh";
   margin?: number;
 }
 /**
@@ -629,6 +644,8 @@ export interface EditState {
   inner_pivot: Vec3;
   outer_pivot: Vec3 | null;
   operations: string[];
+  parent: number | null;
+  carrier: number[] | null;
   problem: string | null;
 }
 /**
@@ -728,6 +745,7 @@ export interface State {
   keys: Key[];
   loop: boolean;
   selection: SelectionCount | null;
+  removed: SelectionCount | null;
   isolated: boolean;
 }
 /**

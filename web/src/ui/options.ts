@@ -3,11 +3,13 @@ import { Pane, type BladeApi } from "tweakpane";
 import type { Actions } from "../editing/actions";
 import type { App } from "../app/app";
 import { halfExtent } from "../editing/cage";
+import { operationAtRest } from "../editing/carrier";
 import { targetCage } from "../editing/drag";
 import { roundDecimals, type Operation } from "../editing/operations";
 import type { Change, EditState, Vec3 } from "../net/protocol";
 import { canFill, canRelight, selectedEdit, dragTarget } from "../app/store";
 import { h, section } from "./dom";
+import { parentRow } from "./parent_row";
 import { pointOptions } from "./point_options";
 
 interface Point {
@@ -70,7 +72,7 @@ export function options(app: App, actions: Actions): HTMLElement {
     if (filling || !last || edit === null) return;
     const { pivot } = targetCage(app.shownCages(edit), dragTarget(app.store.now));
     const by = vectorOf(value).map((x, i) => roundDecimals(x - pivot[i])) as Vec3;
-    if (Math.hypot(...by) > 1e-9) applyNow({ kind: "translate", by });
+    if (Math.hypot(...by) > 1e-9) applyNow(operationAtRest(edit.carrier, { kind: "translate", by }));
   });
   numbers.addBinding(model, "turn", { label: "Turn by °", format: short }).on("change", ({ value, last }) => {
     if (filling || !last || vectorOf(value).every((x) => x === 0)) return;
@@ -118,6 +120,7 @@ export function options(app: App, actions: Actions): HTMLElement {
     relight,
     "Soft shadows where things touch leave with the thing and appear at its new place, those of a dominant light too, where one is found, or all stay (Shift+U).",
   );
+  const parents = parentRow(kind, (parent) => change({ parent }));
   kind.addBinding(model, "preserve", { label: "Keep opacity" }).on("change", ({ value }) => {
     if (!filling) app.send({ type: "scene_change", preserve_opacity: value });
   });
@@ -191,6 +194,7 @@ export function options(app: App, actions: Actions): HTMLElement {
     if (edit.cage !== "box") shell.disabled = true;
     filling = true;
     points.show(edit);
+    parents.show(edit, now.state?.edits ?? []);
     pane.refresh();
     filling = false;
     operations.replaceChildren(...edit.operations.map((text) => h("li", {}, text)));

@@ -57,11 +57,23 @@ export function selectionPanel(app: App, actions: Actions): HTMLElement {
     button("Grow", "One cell more around (Ctrl and +)", "grow", () => actions.changeSelection("grow")),
     button("Shrink", "One cell less around (Ctrl and -)", "shrink", () => actions.changeSelection("shrink")),
   ];
-  const enclose = button("Cage around it", "A new edit with a cage around the selection (E)", "enclose", () =>
-    actions.encloseSelection(model.margin),
+  const enclosing = (
+    [
+      ["Cage around it", "A new edit with a cage around the selection (E)", "enclose", "box"],
+      ["Lattice", "A new edit with a lattice around the selection (Shift+E)", "enclose-lattice", "lattice"],
+      ["Mesh", "A new edit with a closed mesh around the selection (Alt+E)", "enclose-mesh", "mesh"],
+    ] as const
+  ).map(([text, title, name, cage]) =>
+    button(text, title, name, () => actions.encloseSelection(cage, model.margin)),
   );
   const isolate = button("Isolate", "Show the selection alone, or all again (/)", "isolate", () =>
     actions.toggleIsolated(),
+  );
+  const remove = button("Delete selected", "Delete the selection (Ctrl+Delete)", "delete-selected", () =>
+    actions.removeElements(),
+  );
+  const restore = button("Restore deleted", "Restore all that was deleted", "restore-deleted", () =>
+    actions.restoreElements(),
   );
   const chart = histogram(app);
   const whole = section(
@@ -79,9 +91,10 @@ export function selectionPanel(app: App, actions: Actions): HTMLElement {
       "div",
       { class: "bar" },
       button("Floaters", "Select probable floaters", "floaters", selectFloaters),
-      enclose,
+      ...enclosing,
       isolate,
     ),
+    h("div", { class: "bar" }, remove, restore),
     chart,
   );
   whole.classList.add("selection");
@@ -104,9 +117,12 @@ export function selectionPanel(app: App, actions: Actions): HTMLElement {
       selection === null
         ? `No ${noun} are selected: brush (M), lasso (J), or Shift+drag.`
         : `${selection.count.toLocaleString("en")} of ${selection.total.toLocaleString("en")} ${noun} selected`;
+    const removed = state?.removed ?? null;
+    restore.hidden = removed === null;
+    restore.textContent = `Restore ${removed?.count.toLocaleString("en") ?? ""} ${noun}`;
     isolate.disabled = selection === null && state?.isolated !== true;
     isolate.textContent = state?.isolated === true ? "Show all" : "Isolate";
-    for (const each of [...needSelected, enclose]) each.disabled = selection === null;
+    for (const each of [...needSelected, ...enclosing, remove]) each.disabled = selection === null;
   });
   return whole;
 }

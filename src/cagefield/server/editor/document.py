@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import Edit, EditStack
+from cagefield.edits.chains import application_order
 from cagefield.edits.operations import Operation
 from cagefield.edits.shells import SMOOTH_FLOW, Flow
 from cagefield.errors import EditError
@@ -40,6 +41,7 @@ class Document:
     """The edits in order, the scene's opacity choice, the camera path's keyframes, and the selected elements.
 
     The selection is undone as edits are, all pages share it, and no file has it; None selects nothing.
+    Elements in `removed` are deleted from the field; None deletes nothing.
     """
 
     entries: tuple[Entry, ...] = ()
@@ -47,6 +49,7 @@ class Document:
     keys: tuple[Keyframe, ...] = ()
     loop: bool = False
     selection: Selection | None = None
+    removed: Selection | None = None
 
     @classmethod
     def from_edits(
@@ -56,9 +59,10 @@ class Document:
         preserve_opacity: bool = True,
         keys: tuple[Keyframe, ...] = (),
         loop: bool = False,
+        removed: Selection | None = None,
     ) -> Document:
         """The document of an edit stack, its edits numbered from 1."""
-        document = cls((), preserve_opacity, keys, loop)
+        document = cls((), preserve_opacity, keys, loop, removed=removed)
         for number, edit in enumerate(edits, start=1):
             document = document.insert(Entry(number, edit, document.next_colour))
         return document
@@ -67,6 +71,14 @@ class Document:
     def stack(self) -> EditStack:
         """The edits as a stack."""
         return EditStack(entry.edit for entry in self.entries)
+
+    @property
+    def applied(self) -> tuple[Entry, ...]:
+        """The entries in the order of application: children directly before their parents."""
+        if not any(entry.edit.parent for entry in self.entries):
+            return self.entries
+        order = application_order([entry.edit for entry in self.entries])
+        return tuple(self.entries[number] for number in order)
 
     @property
     def saved_part(self) -> Document:

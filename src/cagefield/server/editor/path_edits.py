@@ -16,18 +16,21 @@ def edits_at_time(
     parts: Mapping[int, float],
     known_problem: Callable[[Edit], str | None] = problem,
 ) -> tuple[Edit, ...]:
-    """The edits that are shown, each gone through to its part; a deletion is there from one half on.
+    """The edits that are shown, in the order of application, each gone through to its part.
+
+    A deletion is there from one half on.
 
     `known_problem` says why a whole edit cannot be shown, as `problem` does.
 
     Raises CagefieldError where an edit is possible as a whole, but not there.
     """
     found = []
-    for entry in document.entries:
+    for entry in document.applied:
         part = parts.get(entry.id, 1.0)
         edit = entry.edit
         if not edit.enabled or known_problem(edit) is not None:
             continue
+        edit = edit.without_parent
         there = partial_edit(edit, part)
         if there is None:
             continue

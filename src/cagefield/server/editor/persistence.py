@@ -25,8 +25,10 @@ from cagefield.files.atomic import replaced_file
 from cagefield.files.safe_open import FileState, read_bytes, read_text, real_path
 from cagefield.files.stale_files import remove_leftovers, remove_unfinished
 from cagefield.files.temporary_folders import remove_abandoned
+from cagefield.scene.removed_elements import Removal, dump_removed, read_removed
 from cagefield.scene.scene import Scene
-from cagefield.scene.scene_files import FIELD, field_states
+from cagefield.scene.scene_files import FIELD, REMOVED, field_states
+from cagefield.selection.selection_files import dump_selection, parse_selection
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.edit_texts import ReadEdits, file_values
 from cagefield.server.editor.identity_cache import IdentityCache
@@ -94,6 +96,7 @@ class SceneStore:
             preserve_opacity=self.scene.preserve_opacity,
             keys=keys,
             loop=loop,
+            removed=read_removed(self.path if self.source is None else self.origin),
         )
 
     def recovered(self) -> Document | None:
@@ -248,6 +251,9 @@ class SceneStore:
             if document.keys or (self.path / CAMERA_PATH).exists():
                 draft = drafts.enter_context(replaced_file(self.path / CAMERA_PATH))
                 draft.write_text(camera_path, encoding="utf-8")
+            if document.removed or (self.path / REMOVED).exists():
+                draft = drafts.enter_context(replaced_file(self.path / REMOVED))
+                draft.write_text(dump_removed(document.removed), encoding="utf-8")
             drafts.enter_context(self._scene(document, self.path).draft_manifest(self.path))
             save_edits(self.written(document.stack), self.path / _EDITS)
             self._written = self._fingerprint()  # ours, should the rest not be possible
@@ -301,8 +307,13 @@ class SceneStore:
 
     def _scene(self, document: Document, folder: Path) -> Scene:
         edits = written(document.stack, folder, self.root)
+        removal = None if document.removed is None else Removal(self.scene.field, document.removed)
         return dataclasses.replace(
-            self.scene, edits=edits, preserve_opacity=document.preserve_opacity, folder=folder
+            self.scene,
+            edits=edits,
+            preserve_opacity=document.preserve_opacity,
+            folder=folder,
+            removal=removal,
         )
 
     def _fingerprint(self) -> str:
@@ -324,6 +335,7 @@ def _content(document: Document, edits: list[object]) -> dict[str, object]:
         "locked": [entry.locked for entry in document.entries],
         "preserve_opacity": document.preserve_opacity,
         "loop": document.loop,
+        "removed": None if document.removed is None else dump_selection(document.removed),
         "keys": [
             {
                 "c2w": list(key.c2w),
@@ -352,8 +364,13 @@ def _parsed(content: dict[str, object]) -> Document:
         )
         for key in content["keys"]  # type: ignore[attr-defined]
     )
+    removed = content.get("removed")
     document = Document.from_edits(
-        stack, preserve_opacity=bool(content["preserve_opacity"]), keys=keys, loop=bool(content["loop"])
+        stack,
+        preserve_opacity=bool(content["preserve_opacity"]),
+        keys=keys,
+        loop=bool(content["loop"]),
+        removed=None if removed is None else parse_selection(removed),
     )
     locked = content["locked"]
     entries = tuple(

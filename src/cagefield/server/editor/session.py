@@ -12,15 +12,17 @@ from dataclasses import replace
 
 from cagefield.cameras.keyframes import Keyframe, Timeline
 from cagefield.edits import Continuous, Edit, Paste
+from cagefield.edits.chains import parent_numbers
 from cagefield.edits.edit_files import MAX_EDITS
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
-from cagefield.selection.bounding_cages import outer_cage_of_box
 from cagefield.selection.element_selection import Mode, Selection
+from cagefield.selection.selection_cages import outer_cage_of_shape
 from cagefield.server.editor.active_drags import Drags
 from cagefield.server.editor.cage_placement import cage_pair_around, outer_cage_around
+from cagefield.server.editor.chain_edits import Carriers, renamed, with_own_names, with_parent, without
 from cagefield.server.editor.document import Document, Entry
 from cagefield.server.editor.drag_solver import Moved, Target, move
 from cagefield.server.editor.edit_kinds import Kind, with_kind, with_options, with_outer, with_shell
@@ -70,6 +72,7 @@ class Session:
         self._saved: Document | None = document
         self._next = max((entry.id for entry in document.entries), default=0) + 1
         self._problems: IdentityCache[Edit, str | None] = IdentityCache(4 * MAX_EDITS)
+        self._carriers = Carriers(self.problem)
 
     # ---- what is there ----
 
@@ -101,18 +104,29 @@ class Session:
         return self._problems.put(edit, found or self._source_problem(edit))
 
     def drawn(self) -> tuple[Edit, ...]:
-        """The edits that the picture shows: enabled, changing something, and possible; or the preview's."""
+        """The edits that the picture shows, in the order of application; or the preview's.
+
+        They are enabled, change something, and are possible.
+        """
         if self.preview is not None:
             return self.preview.edits
-        edits = (entry.edit for entry in self.shown.entries)
+        edits = (entry.edit for entry in self.shown.applied)
         return tuple(
-            edit for edit in edits if edit.enabled and edit.changes_anything and self.problem(edit) is None
+            edit.without_parent
+            for edit in edits
+            if edit.enabled and edit.changes_anything and self.problem(edit) is None
         )
+
+    def carrier(self, entry: Entry) -> Array | None:
+        """Affine map [3,4] by which the parents of a shown entry carry its cages; None without any."""
+        return self._carriers.of(self.shown, entry)
 
     def below(self, number: int) -> tuple[Edit, ...]:
         """Drawn edits before edit `number`, which define the space of its inner cage."""
-        first = self.document.entries[: self.document.place(number)]
-        return tuple(entry.edit for entry in first if entry.edit.enabled and self.problem(entry.edit) is None)
+        applied = self.document.applied
+        first = applied[: applied.index(self.document.entry(number))]
+        edits = (entry.edit for entry in first)
+        return tuple(edit.without_parent for edit in edits if edit.enabled and self.problem(edit) is None)
 
     # ---- drags ----
 
@@ -261,9 +275,31 @@ class Session:
 
     def select_elements(self, label: str, selection: Selection | None) -> None:
         """Another selection of elements; an entry of the history where it changes."""
+        removed = self.document.removed
+        if selection and removed is not None:
+            selection = selection.combine(removed, "subtract")
         selection = selection or None
         if selection != self.document.selection:
             self._push(label, replace(self.document, selection=selection))
+
+    def remove_elements(self) -> None:
+        """The selected elements are deleted from the field. Raises EditError without any, or where they are
+        all."""
+        selection = self.document.selection
+        if selection is None:
+            raise EditError(NOTHING_SELECTED)
+        before = self.document.removed or Selection.none(selection.total)
+        removed = before.combine(selection, "add")
+        if removed.count == removed.total:
+            raise EditError("the selection is all of the field; leave something, or invert it (Ctrl+I)")
+        self.isolated = None
+        self._push("Delete selected", replace(self.document, selection=None, removed=removed))
+
+    def restore_elements(self) -> None:
+        """All deleted elements are there again. Raises EditError where none are deleted."""
+        if self.document.removed is None:
+            raise EditError("nothing is deleted from the field")
+        self._push("Restore deleted", replace(self.document, removed=None))
 
     def isolate(self, on: bool) -> None:
         """Show the selected elements alone, on all pages, or all again. Raises EditError without any."""
@@ -274,7 +310,7 @@ class Session:
 
     def place_around_selection(self, inner: Cage) -> int:
         """The number of a new continuous edit, selected, its inner cage around the selected elements."""
-        outer = outer_cage_of_box(inner)
+        outer = outer_cage_of_shape(inner)
         edit = Edit.continuous(inner, outer, name=fresh_name(self.document, "edit"), lattice=LATTICE)
         return self._add("Cage around the selection", edit)
 
@@ -287,27 +323,37 @@ class Session:
         kind: Kind | None = None,
         shell: str | None = None,
         locked: bool | None = None,
+        parent: int | None = None,
         **options: object,
     ) -> None:
         """An edit's options; `options` are other fields of `Edit`: name, enabled, falloff, width, fill, ...
 
-        A continuous edit keeps `fill` and `relight` for when it is discrete again.
+        A continuous edit keeps `fill` and `relight` for when it is discrete again. `parent` is the number of
+        the edit that carries this one, 0 for none.
         """
         before = self.document.entry(number)
         entry = before if locked is None else replace(before, locked=locked)
-        if entry.locked and (kind or shell or set(options) - {"enabled"}):
+        if entry.locked and (kind or shell or parent is not None or set(options) - {"enabled"}):
             raise EditError(f'edit "{entry.edit.name}" is locked; unlock it to change it')
+        if parent is not None:
+            carried = with_parent(self.document, number, parent or None)
+            entry = replace(entry, edit=carried.edit)
         entry = entry if kind is None else with_kind(entry, kind)
         entry = entry if shell is None else with_shell(entry, shell)
         entry = replace(entry, edit=with_options(entry.edit, options))
         words = [
-            word for word, value in (("kind", kind), ("shell", shell), ("lock", locked)) if value is not None
+            word
+            for word, value in (("kind", kind), ("shell", shell), ("lock", locked), ("parent", parent))
+            if value is not None
         ]
         if options.get("enabled") is not None:
             words.append("show" if options["enabled"] else "hide")
         words += [option_word(name) for name in options if name != "enabled"]
         if entry != before:
-            self._put(f"{', '.join(words).capitalize()}{suffix_for(before)}", entry)
+            self._push(
+                f"{', '.join(words).capitalize()}{suffix_for(before)}", renamed(self.document, before, entry)
+            )
+            self.selected = entry.id
 
     def preserve_opacity(self, value: bool) -> None:
         """Whether density is scaled with the map, for all edits."""
@@ -337,10 +383,10 @@ class Session:
         return self._add(f"Mirror{suffix_for(entry)}", edit, at=self.document.place(number) + 1)
 
     def remove(self, number: int) -> None:
-        """An edit goes; the one beside it is selected."""
+        """An edit goes, its children to its own parent; the edit beside it is selected."""
         entry = self._unlocked(number)
         at = self.document.place(number)
-        document = self.document.without(number)
+        document = without(self.document, number)
         self._push(f"Remove{suffix_for(entry)}", document)
         rest = document.entries
         self.selected = rest[min(at, len(rest) - 1)].id if rest else None
@@ -374,11 +420,14 @@ class Session:
         return self.take_edits(ReadEdits(edits_in(text, admitted), (), ()), append)
 
     def take_edits(self, read: ReadEdits, append: bool) -> int:
-        """How many edits there are; they replace the stack, or are appended to it."""
+        """How many edits there are; they replace the stack, or are appended to it.
+
+        Appended parents have names of their own. Raises EditError for a parent that is not possible.
+        """
         for edit, found in zip(read.edits, read.problems, strict=False):
             self._problems.put(edit, found or self._source_problem(edit))
         document = self.document if append else replace(self.document, entries=())
-        for edit in read.edits:
+        for edit in with_own_names(read.edits, document):
             document = document.insert(self._entry(edit, document))
         self._push("Paste" if append else "Load edits", document)
         self.selected = document.entries[-1].id if document.entries else None
@@ -418,7 +467,10 @@ class Session:
     def _travel(self, step: Callable[[History[Document]], History[Document]]) -> None:
         self.drags.clear()
         self.preview = None
+        removed = self.document.removed
         self.history = step(self.history)
+        if self.document.removed != removed:
+            self.isolated = None
         if not self.document.has(self.selected):
             entries = self.document.entries
             self.selected = entries[-1].id if entries else None
@@ -446,6 +498,7 @@ class Session:
         self.selected = entry.id
 
     def _push(self, name: str, document: Document) -> None:
+        parent_numbers([entry.edit for entry in document.entries])
         shown = (entry.edit for entry in document.entries if entry.edit.enabled)
         too_large = problem_of_lattices(edit.kernel_lattice for edit in shown if isinstance(edit, Continuous))
         if too_large is not None:

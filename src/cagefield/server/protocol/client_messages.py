@@ -192,6 +192,9 @@ class Change(Message):
     lattice: Annotated[int, Field(ge=0, le=LATTICE_NODES_RANGE[1])] | None = Field(
         default=None, description="0: exact"
     )
+    parent: Annotated[int, Field(ge=0)] | None = Field(
+        default=None, description="the edit that carries this one; 0: none"
+    )
 
 
 class SceneChange(Message):

@@ -27,6 +27,8 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 Vec3: TypeAlias = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 Corners: TypeAlias = tuple[Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3]
+Affine: TypeAlias = Annotated[list[FiniteFloat], Field(min_length=12, max_length=12)]
+"""An affine map: a matrix [3,4], row by row."""
 Pose: TypeAlias = Annotated[list[FiniteFloat], Field(min_length=16, max_length=16)]
 Axes: TypeAlias = Literal["world", "cage"]
 View: TypeAlias = Literal["colour", "depth", "opacity", "normals"]

@@ -11,6 +11,7 @@ from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Keyframe, Timeline
 from cagefield.edits import Continuous, Edit, Flow, Paste
 from cagefield.edits import operations as ops
+from cagefield.edits.chains import parent_numbers
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import CastShadow
 from cagefield.errors import CameraError
@@ -131,9 +132,13 @@ def _cage_kind(cage: Cage) -> Literal["box", "lattice", "points", "mesh"]:
 
 
 def edit_state(
-    entry: Entry, problem: str | None, error: tuple[float, float] | None
+    entry: Entry,
+    problem: str | None,
+    error: tuple[float, float] | None,
+    parent: int | None = None,
+    carrier: Array | None = None,
 ) -> server_messages.EditState:
-    """One edit as pages show it; `error` is its lattice's, in voxels."""
+    """One edit as pages show it; `error` is its lattice's, in voxels, `carrier` its parents' map [3,4]."""
     edit, settings = entry.edit, entry.edit.shell_settings
     points = points_state(edit)
     flow = settings.shell if isinstance(settings.shell, Flow) else Flow()
@@ -162,6 +167,8 @@ def edit_state(
         inner_pivot=vec3(cage_in_scene(edit).pivot),
         outer_pivot=None if settings.outer is None else vec3(settings.outer.pivot),
         operations=[f"{operation.noun} {operation}" for operation in edit.operations],
+        parent=parent,
+        carrier=None if carrier is None else cast(Any, tuple(carrier.reshape(-1).tolist())),
         problem=problem,
     )
 
@@ -176,11 +183,19 @@ def state_of(
 ) -> server_messages.State:
     """Everything that pages show of the edits, drags included; `errors` of lattices by edit, where known."""
     document = session.shown
+    parents = parent_numbers([entry.edit for entry in document.entries])
     return server_messages.State(
         revision=session.revision,
         pictured=pictured,
         edits=[
-            edit_state(entry, session.problem(entry.edit), errors.get(entry.id)) for entry in document.entries
+            edit_state(
+                entry,
+                session.problem(entry.edit),
+                errors.get(entry.id),
+                None if parent is None else document.entries[parent].id,
+                session.carrier(entry),
+            )
+            for entry, parent in zip(document.entries, parents, strict=True)
         ],
         selected=session.selected,
         history=list(session.history.names),
@@ -195,6 +210,7 @@ def state_of(
         ],
         loop=document.loop,
         selection=_count_of(document.selection),
+        removed=_count_of(document.removed),
         isolated=session.isolated is not None,
     )
 

@@ -14,6 +14,7 @@ from pydantic import Field, FiniteFloat
 from cagefield.selection.screen_regions import MAX_REGION_POINTS, MAX_SHARE
 from cagefield.server.protocol.common import Message
 
+CageShape: TypeAlias = Literal["box", "lattice", "mesh"]
 ModeName: TypeAlias = Literal["replace", "add", "subtract", "intersect"]
 AttributeName: TypeAlias = Literal["size", "opacity", "red", "green", "blue", "hue", "saturation", "value"]
 Share: TypeAlias = Annotated[float, Field(ge=0, le=1)]
@@ -76,9 +77,13 @@ class ChangeSelection(Message):
 
 
 class SelectionCage(Message):
-    """A new edit with an inner cage around the selected elements as they are seen, an oriented box."""
+    """A new edit with an inner cage around the selected elements as they are seen.
+
+    A "box" is oriented, a "lattice" that box divided into cells near to cubes, a "mesh" closed and decimated.
+    """
 
     type: Literal["selection_cage"] = "selection_cage"
+    cage: CageShape = "box"
     margin: Annotated[float, Field(ge=0, le=100)] = 1.0
     """Distance from the elements to the cage, cells of the occupancy grid."""
 
@@ -90,6 +95,20 @@ class Isolate(Message):
     on: bool
 
 
+class RemoveElements(Message):
+    """Deletes the selected elements from the field, or restores all that were deleted."""
+
+    type: Literal["remove_elements"] = "remove_elements"
+    restore: bool = False
+
+
 SelectionMessage: TypeAlias = (
-    SelectRegion | SelectRange | SelectFlood | SelectFloaters | ChangeSelection | SelectionCage | Isolate
+    SelectRegion
+    | SelectRange
+    | SelectFlood
+    | SelectFloaters
+    | ChangeSelection
+    | SelectionCage
+    | Isolate
+    | RemoveElements
 )

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from cagefield.server.editor.edit_kinds import Kind
 from cagefield.server.protocol.common import (
+    Affine,
     CameraMessage,
     Corners,
     CurveName,
@@ -96,6 +97,10 @@ class EditState(Message):
     inner_pivot: Vec3
     outer_pivot: Vec3 | None
     operations: list[str]
+    parent: EditId | None
+    """The edit that carries this one."""
+    carrier: Affine | None
+    """Map of the cages above, which are at rest, to where the parents carry them; None where they stay."""
     problem: str | None
     """Why the edit cannot be shown, in a sentence with its cure; it is left out of the picture until then."""
 
@@ -130,6 +135,8 @@ class State(Message):
     loop: bool
     selection: SelectionCount | None
     """Selected elements of the field; None for none."""
+    removed: SelectionCount | None
+    """Deleted elements of the field; None for none."""
     isolated: bool
     """True where pictures show isolated elements alone."""
 

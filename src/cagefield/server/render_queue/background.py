@@ -98,7 +98,7 @@ class BackgroundWork:
         """(max, mean) error of each edit's lattice by its number, voxels, where it is known."""
         found = {}
         for entry in self._session.shown.entries:
-            error = self._errors.get(entry.edit)
+            error = self._errors.get(entry.edit.without_parent)
             if error is not None:
                 found[entry.id] = error
         return found

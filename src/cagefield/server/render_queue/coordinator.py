@@ -40,8 +40,8 @@ from cagefield.server.render_worker.tasks import (
 )
 from cagefield.server.render_worker.view import Display
 
-Options = tuple[bool, Selection | None]
-"""Options that change all of a picture: the opacity choice, and isolated elements."""
+Options = tuple[bool, Selection | None, Selection | None]
+"""Options that change all of a picture: the opacity choice, isolated and deleted elements."""
 
 
 @dataclass
@@ -357,8 +357,13 @@ class Coordinator:
 
     def _what_is_shown(self) -> Shown:
         session = self.session
-        return Shown(values_of(session.drawn()), session.shown.preserve_opacity, session.isolated)
+        return Shown(
+            values_of(session.drawn()),
+            session.shown.preserve_opacity,
+            session.isolated,
+            session.shown.removed,
+        )
 
 
 def _options_of(shown: Shown) -> Options:
-    return shown.preserve_opacity, shown.isolated
+    return shown.preserve_opacity, shown.isolated, shown.removed

@@ -38,7 +38,7 @@ class Job:
         """The next picture. Raises CagefieldError where its edits, blended as they are there, fail."""
         still = self.stills[self.done]
         edits = edits_at_time(self.document, still.parts)
-        shown = Shown(values_of(edits), self.document.preserve_opacity)
+        shown = Shown(values_of(edits), self.document.preserve_opacity, removed=self.document.removed)
         return FrameTask(
             number,
             self.number,

@@ -12,6 +12,7 @@ from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.files.temporary_folders import TemporaryFolder
+from cagefield.selection.element_selection import Selection
 from cagefield.server.editor.persistence import SceneStore, stem_of
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import server_messages
@@ -97,12 +98,17 @@ class Exports:
 
     async def _write(self, export: _Export) -> None:
         document = self._session.document
-        edits = tuple(entry.edit for entry in document.entries if entry.edit.enabled)
+        edits = tuple(entry.edit.without_parent for entry in document.applied if entry.edit.enabled)
         edits = tuple(e for e in edits if e.changes_anything and self._session.problem(e) is None)
         path = self._path(export)
         try:
             await run_in_process(
-                write_edited, str(self._store.origin), values_of(edits), document.preserve_opacity, str(path)
+                write_edited,
+                str(self._store.origin),
+                values_of(edits),
+                document.preserve_opacity,
+                str(path),
+                document.removed,
             )
         except asyncio.CancelledError:
             self._forget(export)
@@ -122,17 +128,28 @@ class Exports:
         self._exports.pop(export.number, None)
 
 
-def write_edited(scene: str, edits: tuple[EditValues, ...], preserve_opacity: bool, out: str) -> int:
-    """Writes the splats of a scene's folder under other edits than its own; returns how many there are."""
+def write_edited(
+    scene: str,
+    edits: tuple[EditValues, ...],
+    preserve_opacity: bool,
+    out: str,
+    removed: Selection | None = None,
+) -> int:
+    """Writes the splats of a scene's folder under other edits, and without other elements, than its own;
+    returns how many there are."""
     import dataclasses
 
     from cagefield.exporting import edited_splats, upright
     from cagefield.formats.splats.splat_files import write_splats
+    from cagefield.scene.removed_elements import without_removed
     from cagefield.scene.scene import Scene
 
-    opened = Scene.open(scene)
+    opened = Scene.open(scene, whole=True)
+    field = without_removed(opened.field, removed)
     stack = EditStack(values.edit() for values in edits)
-    splats = edited_splats(dataclasses.replace(opened, edits=stack, preserve_opacity=preserve_opacity))
+    splats = edited_splats(
+        dataclasses.replace(opened, field=field, edits=stack, preserve_opacity=preserve_opacity)
+    )
     Path(out).parent.mkdir(parents=True, exist_ok=True)
     write_splats(upright(splats, opened.up), out)
     return len(splats)

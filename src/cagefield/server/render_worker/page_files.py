@@ -30,6 +30,8 @@ KEPT_OCCUPANCIES = 6
 
 NOT_DRAWN = "pages draw voxels and splats alone; the server draws this scene"
 
+REMOVED = "elements are deleted; the server draws the others"
+
 ISOLATED = "elements are isolated; the server draws them"
 
 
@@ -57,6 +59,8 @@ class PageFiles:
         """The edits' file, or the part of it that the page has not. Raises EditError, CagefieldError."""
         if task.shown.isolated is not None:
             raise CagefieldError(ISOLATED)
+        if task.shown.removed is not None:
+            raise CagefieldError(REMOVED)
         began = time.perf_counter()
         edits = self._renderers.edits(task.shown.edits)
         self._for_page.keep_only(self._renderers.known_edits)

@@ -90,10 +90,10 @@ def _opened(connection: Connection, folder: str, files: object) -> Scene | None:
     from cagefield.scene.scene_files import field_states
 
     if files is None:
-        return Scene.open(folder)
+        return Scene.open(folder, whole=True)
     if field_states(folder) == files:
         try:
-            scene = Scene.open(folder)
+            scene = Scene.open(folder, whole=True)
         except CagefieldError:
             if field_states(folder) == files:
                 raise
@@ -105,7 +105,7 @@ def _opened(connection: Connection, folder: str, files: object) -> Scene | None:
         copy = connection.recv()
     except _LOST:
         return None
-    return None if copy is None else Scene.open(copy)
+    return None if copy is None else Scene.open(copy, whole=True)
 
 
 def _sent(connection: Connection, content: Any) -> bool:

@@ -21,7 +21,7 @@ from cagefield.scene.scene import Scene
 from cagefield.server.render_worker import encoding
 from cagefield.server.render_worker.cancellation import GivenUpError, Stop, cancellation_check
 from cagefield.server.render_worker.edited_renderers import EditedRenderers, RefinedRenderer
-from cagefield.server.render_worker.isolated_renderers import IsolatedRenderers
+from cagefield.server.render_worker.isolated_renderers import IsolatedRenderers, RemainingRenderers
 from cagefield.server.render_worker.refinement import FINAL, Refinement
 from cagefield.server.render_worker.tasks import (
     EditValues,
@@ -64,6 +64,7 @@ class RendererCache:
         self._edits: list[Edit] = []
         self.edited = EditedRenderers(self.plain, self._is_sampled, scene.patcher)
         self._isolated = IsolatedRenderers(scene.field)
+        self._remaining = RemainingRenderers(scene)
         lower, upper = scene.field.bounds
         self._middle = 0.5 * (lower + upper)
         self._radius = 0.5 * float(np.linalg.norm(upper - lower))
@@ -140,10 +141,19 @@ class RendererCache:
         return edited.renderer(edits, shown.preserve_opacity, refinement, proceed)
 
     def _renderers_of(self, shown: Shown) -> tuple[InteractiveRenderer, EditedRenderers]:
-        """(renderer without edits, edited renderers) of the field, or of its isolated elements."""
-        if shown.isolated is None:
-            return self.plain, self.edited
-        return self._isolated.renderers(shown.isolated)
+        """(renderer without edits, edited renderers) of the field, or of its elements that are shown."""
+        if shown.isolated is not None:
+            isolated = shown.isolated
+            if shown.removed is not None:
+                isolated = isolated.combine(shown.removed, "subtract")
+            return self._isolated.renderers(isolated)
+        if shown.removed is not None:
+            return self._remaining.renderers(shown.removed)
+        return self.plain, self.edited
+
+    def shown_scene(self, shown: Shown) -> Scene:
+        """The scene without deleted elements."""
+        return self.scene if shown.removed is None else self._remaining.scene(shown.removed)
 
     def surface(
         self, shown: Shown, camera: Camera, x: float, y: float, *, normals: bool = False

@@ -10,7 +10,6 @@ import numpy as np
 from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
-from cagefield.selection.bounding_cages import oriented_box
 from cagefield.selection.element_positions import DeformedPositions, deformed_positions
 from cagefield.selection.element_selection import Selection
 from cagefield.selection.elements import Elements, histogram
@@ -18,6 +17,7 @@ from cagefield.selection.field_elements import elements_of_field
 from cagefield.selection.floater_preset import floaters
 from cagefield.selection.neighborhoods import flood, grow, interior, shrink
 from cagefield.selection.screen_regions import elements_in_region
+from cagefield.selection.selection_cages import cage_around
 from cagefield.server.render_worker.picks import (
     EveryPick,
     FloaterPick,
@@ -48,7 +48,7 @@ class SelectionHandlers:
         self._renderers = renderers
 
     def answer(self, task: SelectionTask, proceed: Callable[[], None] | None = None) -> Any:
-        """Result of a task: a Selection, a Histogram, a Highlight, or the corners of a box.
+        """Result of a task: a Selection, a Histogram, a Highlight, or a cage.
 
         Raises CagefieldError where there is none; `proceed` is called now and then, and cancels by raising.
         """
@@ -56,6 +56,8 @@ class SelectionHandlers:
             picked = self._picked(task.shown, task.pick)
             if task.shown.isolated is not None:
                 picked = picked & self._mask(task.shown.isolated)
+            if task.shown.removed is not None:
+                picked = picked & ~self._mask(task.shown.removed)
             return Selection.from_mask(picked)
         elements = self._elements
         if isinstance(task, HistogramTask):
@@ -69,8 +71,7 @@ class SelectionHandlers:
                     "nothing of the selection is to be seen: edits delete or cover all of it"
                 )
             margin = task.margin * elements.cell_edge
-            box = oriented_box(seen.points, margin=margin, radii=elements.radii[seen.element])
-            return box.corners.tolist()
+            return cage_around(task.shape, seen.points, margin, elements.radii[seen.element])
         if elements.kind == "cells":
             mask = mask & ~interior(elements, mask)
         seen = self._positions(task.shown, np.flatnonzero(mask), proceed)
@@ -141,7 +142,10 @@ class SelectionHandlers:
         if found is None:
             raise CagefieldError("there is no surface under the mouse; click on the object")
         point, _ = found
-        seen = self._positions(shown, np.arange(len(self._elements)))
+        there = np.ones(len(self._elements), bool)
+        if shown.removed is not None:
+            there &= ~self._mask(shown.removed)
+        seen = self._positions(shown, np.flatnonzero(there))
         if not len(seen.points):
             raise CagefieldError("the field has nothing to select: all of it is transparent or deleted")
         return int(seen.element[np.argmin(((seen.points - point) ** 2).sum(axis=1))])

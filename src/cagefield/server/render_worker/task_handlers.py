@@ -163,16 +163,15 @@ class TaskHandlers:
 
     def _fit(self, task: FitTask) -> list[bool]:
         """Which of the cage's `probes` are dense."""
-        field: VoxelField | SplatField | SplatSet = self._renderers.scene.rendered_field
+        scene = self._renderers.shown_scene(task.shown)
+        field: VoxelField | SplatField | SplatSet = scene.rendered_field
         edits: EditMap
         if task.source is not None:
-            content = self._renderers.scene.sources.read(task.source)
+            content = scene.sources.read(task.source)
             field, edits = content.field, content.edits
         else:
             below = self._renderers.edits(task.shown.edits)
-            edits = self._renderers.scene.patcher.prepare(
-                below, stage=PatchStage.CACHED, preserve_opacity=False
-            )
+            edits = scene.patcher.prepare(below, stage=PatchStage.CACHED, preserve_opacity=False)
         if not isinstance(field, VoxelField):
             return dense_cells(task.cage, deformed_splats(field, edits)).tolist()
         from cagefield.edits.kernel_map import KernelMap

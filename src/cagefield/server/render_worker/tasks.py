@@ -13,6 +13,7 @@ from cagefield.edits import Edit
 from cagefield.geometry.cage import Cage
 from cagefield.selection.element_selection import Selection
 from cagefield.selection.elements import Attribute
+from cagefield.selection.selection_cages import CageShape
 from cagefield.server.render_worker.picks import Pick
 from cagefield.server.render_worker.refinement import Refinement
 from cagefield.server.render_worker.view import Display, Region
@@ -51,14 +52,16 @@ def values_of(edits: tuple[Edit, ...]) -> tuple[EditValues, ...]:
 
 @dataclass(frozen=True)
 class Shown:
-    """Content of an image: edits (see `values_of`), the scene's opacity choice, and isolated elements.
+    """Content of an image: edits (see `values_of`), the scene's opacity choice, elements that are shown.
 
-    With `isolated` elements the field has no others, and edits show no patches and no pastes.
+    With `isolated` elements the field has no others, and edits show no patches and no pastes. The field has
+    none of the `removed` elements.
     """
 
     edits: tuple[EditValues, ...]
     preserve_opacity: bool = True
     isolated: Selection | None = None
+    removed: Selection | None = None
 
 
 @dataclass(frozen=True)
@@ -219,12 +222,13 @@ class HistogramTask:
 
 @dataclass(frozen=True)
 class BoxTask:
-    """Corners of an oriented box around the selected elements as edits show them; `margin` in cells."""
+    """Cage of a shape around the selected elements as edits show them; `margin` in cells."""
 
     number: int
     shown: Shown
     selection: Selection
     margin: float
+    shape: CageShape = "box"
 
 
 @dataclass(frozen=True)

@@ -292,7 +292,8 @@ class MessageHandlers:
     async def _fit_inner(self, message: client_messages.FitInner) -> None:
         edit = self._session.document.entry(message.edit).edit
         cage: Cage = edit.inner
-        below = Shown(values_of(self._session.below(message.edit)))
+        removed = self._session.document.removed
+        below = Shown(values_of(self._session.below(message.edit)), removed=removed)
         source = edit.source if isinstance(edit, Paste) else None
         dense = await self._coordinator.ask(lambda number: FitTask(number, below, cage, source))
         if self._session.document.entry(message.edit).edit.inner == cage:
@@ -313,6 +314,7 @@ class MessageHandlers:
     @_handles(selection_messages.ChangeSelection)
     @_handles(selection_messages.SelectionCage)
     @_handles(selection_messages.Isolate)
+    @_handles(selection_messages.RemoveElements)
     async def _select_elements(self, message: selection_messages.SelectionMessage) -> None:
         await change_selection(self._coordinator, self._page, message)
         self._coordinator.changed()

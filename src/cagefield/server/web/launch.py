@@ -22,6 +22,7 @@ from cagefield.fields.splat_field import SplatField
 from cagefield.files.safe_open import MAX_TEXT_BYTES, FileState, check_regular, read_text, real_path
 from cagefield.formats.splats.detection import LOD_META, META, is_splat_folder
 from cagefield.pages.page_field import VERSION as FIELD_VERSION
+from cagefield.scene.removed_elements import read_removed, without_removed
 from cagefield.scene.scene import Scene
 from cagefield.scene.scene_files import field_states, is_scene, recover
 from cagefield.server.editor.pasted_sources import source_problem
@@ -69,7 +70,8 @@ def open_cached(
     try:
         recover(path)
         files = field_states(path)
-        scene = Scene.open(path)
+        scene = Scene.open(path, whole=True)
+        without_removed(scene.field, read_removed(path))  # an error here, not in the first picture
         store = SceneStore(scene, path, source, root, files=files)
         store.lock()
     finally:

@@ -31,8 +31,10 @@ async def change_selection(coordinator: Coordinator, page: Page, message: messag
     """Follow a message about selected elements. Raises CagefieldError where it cannot be followed."""
     if isinstance(message, messages.Isolate):
         coordinator.session.isolate(message.on)
+    elif isinstance(message, messages.RemoveElements):
+        _remove(coordinator, message)
     elif isinstance(message, messages.SelectionCage):
-        await _place_cage(coordinator, message.margin)
+        await _place_cage(coordinator, message)
     elif isinstance(message, messages.ChangeSelection):
         await _change(coordinator, message)
     else:
@@ -41,6 +43,18 @@ async def change_selection(coordinator: Coordinator, page: Page, message: messag
         if not picked and message.mode == "replace":
             page.notice("info", "nothing there: the selection is empty")
         coordinator.session.pick(label, picked, message.mode)
+
+
+def _remove(coordinator: Coordinator, message: messages.RemoveElements) -> None:
+    if message.restore:
+        coordinator.session.restore_elements()
+        return
+    if coordinator.store.scene.original is not None:
+        raise CagefieldError(
+            "the scene has the NeRF that its voxels were baked from, of which nothing can be deleted; "
+            "delete with a cage (E, then Delete as its kind)"
+        )
+    coordinator.session.remove_elements()
 
 
 async def histogram_of(coordinator: Coordinator, attribute: messages.AttributeName) -> HistogramCounts:
@@ -68,13 +82,15 @@ async def _change(coordinator: Coordinator, message: messages.ChangeSelection) -
         session.pick(_LABELS[message.change], await _picked(coordinator, pick))
 
 
-async def _place_cage(coordinator: Coordinator, margin: float) -> None:
+async def _place_cage(coordinator: Coordinator, message: messages.SelectionCage) -> None:
     selection = coordinator.session.document.selection
     if selection is None:
         raise CagefieldError(NOTHING_SELECTED)
     shown = coordinator.shown()
-    corners = await coordinator.ask(lambda number: BoxTask(number, shown, selection, margin))
-    coordinator.session.place_around_selection(Cage(np.array(corners)))
+    cage: Cage = await coordinator.ask(
+        lambda number: BoxTask(number, shown, selection, message.margin, message.cage)
+    )
+    coordinator.session.place_around_selection(cage)
 
 
 def _pick_of(coordinator: Coordinator, page: Page, message: messages.SelectionMessage) -> tuple[str, Pick]:
