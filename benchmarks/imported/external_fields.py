@@ -100,12 +100,11 @@ def edited(scene: Scene, camera: Camera) -> list[str]:
     """Of one continuous and one discrete edit of the box's upper half: PSNR, and seconds of both pictures."""
     low, high = scene.field.bounds
     size, center = high - low, 0.5 * (low + high)
+    middle = center + np.array([0.0, 0.0, 0.1 * size[2]])
     upper = Cage.box(center + np.array([0.0, 0.0, 0.25 * size[2]]), size * np.array([1.0, 1.0, 0.5]))
     by = 0.12 * size[2] * np.array([1.0, 0.0, 0.6])
     edits = (
-        Edit.continuous(upper, Cage.box(center + np.array([0.0, 0.0, 0.1 * size[2]]), 2.2 * size)).translate(
-            by
-        ),
+        Edit.continuous(upper, Cage.box(middle, 2.2 * size)).translate(by),
         Edit.move(upper).translate(2.0 * by),
     )
     columns = []
