@@ -7,6 +7,7 @@ from pathlib import Path
 
 from cagefield.errors import FieldError
 from cagefield.fields.external.external_field import ExternalField
+from cagefield.fields.external.plenoctree import PlenOctreeField
 from cagefield.fields.external.tensorf import TensorfField
 from cagefield.fields.field_files import read_tensors, write_tensors
 from cagefield.files import json_text
@@ -15,7 +16,7 @@ FORMAT_VERSION = "1"
 
 _CURE = "copy it back or import the checkpoint again"
 
-KINDS: dict[str, type[ExternalField]] = {kind.KIND: kind for kind in (TensorfField,)}
+KINDS: dict[str, type[ExternalField]] = {kind.KIND: kind for kind in (TensorfField, PlenOctreeField)}
 """Classes of fields by the kind in the header."""
 
 
