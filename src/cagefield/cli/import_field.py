@@ -28,7 +28,7 @@ class ImportField:
     """
 
     file: tyro.conf.Positional[Path]
-    """Splats, or a checkpoint of nerfstudio's splatfacto, either nerf-pytorch, or TensoRF."""
+    """Splats, or a checkpoint of nerfstudio's splatfacto, nerf-pytorch, TensoRF, svox2 or svox."""
     out: Output
     """Scene folder."""
     data: Path | None = None
