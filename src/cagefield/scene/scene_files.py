@@ -10,7 +10,7 @@ from typing import Any
 from cagefield.cameras.camera import Camera
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.external.external_field import ExternalField
-from cagefield.fields.external.external_file import KINDS, load_external, save_external
+from cagefield.fields.external.external_file import EXTERNAL_KINDS, load_external, save_external
 from cagefield.fields.field_files import read_field_kind
 from cagefield.fields.nerf_field import NerfField
 from cagefield.fields.nerf_file import load_nerf, save_nerf
@@ -152,7 +152,7 @@ def read_original(path: Path) -> NerfField | ExternalField:
         FieldError: the file is damaged, of a kind that is not read or of a newer version.
     """
     kind = read_field_kind(path)
-    return load_external(path, kind) if kind in KINDS else load_nerf(path)
+    return load_external(path, kind) if kind in EXTERNAL_KINDS else load_nerf(path)
 
 
 def save_original(field: NerfField | ExternalField, path: Path) -> None:

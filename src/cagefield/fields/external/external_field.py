@@ -2,7 +2,7 @@
 
 An `ExternalField` is a `Field` (canonical space, world units, NumPy) that keeps the program's own parameters.
 Its `torch` counterpart, a `TorchField`, evaluates them and places the samples of rays as the program does.
-Adding a program takes one subclass of each, a line in `external_file.KINDS`, and a reader in
+Adding a program takes one subclass of each, a line in `external_file.EXTERNAL_KINDS`, and a reader in
 `formats.external`.
 """
 

@@ -16,7 +16,7 @@ FORMAT_VERSION = "1"
 
 _CURE = "copy it back or import the checkpoint again"
 
-KINDS: dict[str, type[ExternalField]] = {kind.KIND: kind for kind in (TensorfField, PlenOctreeField)}
+EXTERNAL_KINDS: dict[str, type[ExternalField]] = {kind.KIND: kind for kind in (TensorfField, PlenOctreeField)}
 """Classes of fields by the kind in the header."""
 
 
@@ -27,7 +27,7 @@ def save_external(field: ExternalField, path: str | Path) -> None:
 
 
 def load_external(path: str | Path, kind: str) -> ExternalField:
-    """Field of a safetensors file whose header names a kind of `KINDS`; does not need PyTorch.
+    """Field of a safetensors file whose header names a kind of `EXTERNAL_KINDS`; does not need PyTorch.
 
     Raises:
         FieldError: the file is missing, truncated, of another kind or a newer version, or has arrays and
@@ -38,7 +38,7 @@ def load_external(path: str | Path, kind: str) -> ExternalField:
         options = json_text.loads(metadata["options"])
         if not isinstance(options, dict):
             raise TypeError("options are no object")
-        return KINDS[kind].from_arrays(arrays, options)
+        return EXTERNAL_KINDS[kind].from_arrays(arrays, options)
     except FieldError as error:
         raise FieldError(f"{path}: {error}") from error
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError) as error:

@@ -33,7 +33,7 @@ from cagefield.typing import Float32
 
 SHADINGS = ("MLP_Fea", "MLP_PE", "MLP", "SH", "RGB")
 ACTIVATIONS = ("softplus", "relu")
-MAX_SAMPLES = 1 << 16
+MAX_RAY_SAMPLES = 1 << 16
 """Maximum number of samples on a ray; the authors' largest grids take about 2,000."""
 
 _Group = tuple[Float32, ...]
@@ -109,7 +109,7 @@ class TensorfParameters:
         fix("distance_scale", number("distance_scale", self.distance_scale, 1e-6, 1e6))
         fix("color_weight", number("rayMarch_weight_thres", self.color_weight, 0.0, 1.0))
         diagonal = float(np.linalg.norm(self.box[1] - self.box[0]))
-        fix("step", number("step of samples", self.step, diagonal / MAX_SAMPLES, diagonal))
+        fix("step", number("step of samples", self.step, diagonal / MAX_RAY_SAMPLES, diagonal))
         if not isinstance(self.near_far, (tuple, list)) or len(self.near_far) != 2:
             raise FieldError(f"near_far must be two distances, got {self.near_far!r:.60}")
         near, far = (number("near_far", value, 0.0, 1e9) for value in self.near_far)

@@ -22,7 +22,7 @@ from cagefield.fields.external.plenoctree import PlenOctreeField
 from cagefield.files.npz import DEFLATED, read_arrays
 from cagefield.formats.external.checkpoint import ExternalCheckpoint
 
-MAX_INFLATION = 200
+MAX_LEAVES_INFLATION = 200
 """Maximum ratio of an array's size to the file's: leaves of empty space compress well."""
 
 _Headers = dict[str, tuple[tuple[int, ...], np.dtype[Any]]]
@@ -47,7 +47,7 @@ def read_plenoctree(path: Path, headers: _Headers) -> ExternalCheckpoint:
     for name in ("child", "data"):
         shape, kind = headers[name]
         size = math.prod(shape) * kind.itemsize
-        if kind.kind != {"child": "i", "data": "f"}[name] or size > MAX_INFLATION * file_bytes:
+        if kind.kind != {"child": "i", "data": "f"}[name] or size > MAX_LEAVES_INFLATION * file_bytes:
             raise FieldError(f"{name} says that it is {kind} {list(shape)}; the file has {file_bytes} bytes")
     scale_name = "invradius3" if "invradius3" in headers else "invradius"
     names = {"child", "data", "offset", scale_name, "data_format"}

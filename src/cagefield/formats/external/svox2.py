@@ -35,7 +35,7 @@ SCENE_SCALE = 2.0 / 3.0
 MAX_CELLS, MAX_CELLS_PER_ROW = 1 << 27, 1000
 """Cells of a grid without minimum occupancy (512^3), and maximum per stored row beyond."""
 
-MAX_INFLATION = 64
+MAX_ROWS_INFLATION = 64
 """Maximum ratio of the stored rows' size to the file's; trained values hardly compress."""
 
 _SPHERICAL_HARMONICS = 1
@@ -105,7 +105,7 @@ def _check_headers(headers: _Headers, names: tuple[str, ...], file_bytes: int) -
         if len(size) != 2 or kind.kind != "f":
             raise FieldError(f"{name} must be floats [N,C], got {kind} {list(size)}")
         counts.add(size[0])
-        if math.prod(size) * kind.itemsize > MAX_INFLATION * file_bytes:
+        if math.prod(size) * kind.itemsize > MAX_ROWS_INFLATION * file_bytes:
             raise FieldError(
                 f"{name} says that it holds {list(size)} numbers, the file has {file_bytes} bytes"
             )
