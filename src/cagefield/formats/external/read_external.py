@@ -1,0 +1,72 @@
+"""Checkpoints of other programs, told apart by their content."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cagefield.errors import FieldError
+from cagefield.files.npz import array_headers
+from cagefield.files.safe_open import UnreadableError, check_regular
+from cagefield.formats.external.checkpoint import ExternalCheckpoint, format_names
+from cagefield.formats.external.plenoctree import is_plenoctree, read_plenoctree
+from cagefield.formats.external.svox2 import is_svox2, read_svox2
+from cagefield.formats.external.tensorf import is_tensorf, read_tensorf
+from cagefield.formats.torch_files import read_torch_tensors
+
+Headers = dict[str, tuple[tuple[int, ...], np.dtype[Any]]]
+"""(shape, type) of the arrays of an .npz by name."""
+
+_TORCH: tuple[
+    tuple[Callable[[Mapping[str, Any]], bool], Callable[[Mapping[str, Any]], ExternalCheckpoint]], ...
+] = ((is_tensorf, read_tensorf),)
+"""(test, reader) of dictionaries that `torch.save` wrote."""
+
+_NPZ: tuple[tuple[Callable[[Headers], bool], Callable[[Path, Headers], ExternalCheckpoint]], ...] = (
+    (is_svox2, read_svox2),
+    (is_plenoctree, read_plenoctree),
+)
+"""(test, reader) of files that `numpy.savez` wrote."""
+
+
+def read_external(path: Path | str, config: Path | None = None) -> ExternalCheckpoint | None:
+    """Field of another program's checkpoint; None for a PyTorch file of none of them, as nerf-pytorch's.
+
+    Raises:
+        FieldError: missing or damaged file, objects beside tensors and plain values (which are not
+            unpickled), missing or misshapen tensors, missing PyTorch.
+    """
+    path = Path(path)
+    try:
+        if path.suffix.lower() == ".npz":
+            return _read_npz(path)
+        content = read_torch_tensors(path)
+        for test, reader in _TORCH:
+            if test(content):
+                return reader(content)
+    except FieldError as error:
+        message = str(error)
+        raise FieldError(message if message.startswith(str(path)) else f"{path}: {message}") from None
+    return None
+
+
+def _read_npz(path: Path) -> ExternalCheckpoint:
+    try:
+        check_regular(path)
+        headers = array_headers(path)
+        for test, reader in _NPZ:
+            if test(headers):
+                return reader(path, headers)
+    except UnreadableError as error:
+        raise FieldError(f"{path}: {error}") from None
+    except (ValueError, OSError) as error:
+        if isinstance(error, FieldError):
+            raise
+        reason = getattr(error, "strerror", None) or str(error)
+        raise FieldError(f"{path}: not a readable .npz ({reason:.160}); copy it again") from error
+    raise FieldError(
+        f"{path}: no field that is read: it holds {format_names(headers)}; expected those of svox2 or svox"
+    )
