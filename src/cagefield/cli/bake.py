@@ -16,6 +16,7 @@ from cagefield.files.safe_open import real_path
 
 if TYPE_CHECKING:
     from cagefield.cameras.camera import Camera
+    from cagefield.fields.external.external_field import ExternalField
     from cagefield.fields.nerf_field import NerfField
     from cagefield.fields.splat_field import SplatField
     from cagefield.scene.scene import Scene
@@ -73,14 +74,14 @@ class Bake:
 
 
 def bake_scene(
-    original: NerfField | SplatField,
+    original: NerfField | ExternalField | SplatField,
     cameras: Mapping[str, tuple[Camera, ...]],
     background: tuple[float, float, float] | None,
     options: BakingOptions,
     *,
     unbounded: bool = False,
 ) -> tuple[Scene, str]:
-    """The scene of a NeRF's or splats' voxels, with a progress bar on stderr, and a line of figures.
+    """The scene of a field's or splats' voxels, with a progress bar on stderr, and a line of figures.
 
     Of an `unbounded` one the region that the cameras see is baked.
     """

@@ -1,4 +1,4 @@
-"""`cagefield import`: splats or a NeRF of another program as a scene."""
+"""`cagefield import`: splats or a radiance field of another program as a scene."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
+    from cagefield.formats.external.checkpoint import ExternalCheckpoint
     from cagefield.scene.scene import Scene
 
 Unbounded = Literal["auto", "on", "off"]
@@ -27,7 +28,7 @@ class ImportField:
     """
 
     file: tyro.conf.Positional[Path]
-    """Splats, or a checkpoint of nerfstudio's splatfacto, yenchenlin's or krrish94's nerf-pytorch."""
+    """Splats, or a checkpoint of nerfstudio's splatfacto, either nerf-pytorch, or TensoRF."""
     out: Output
     """Scene folder."""
     data: Path | None = None
@@ -60,7 +61,7 @@ class ImportField:
         if holds_splats(self.file):
             scene, lines = self._splats()
         else:
-            scene, lines = self._nerf()
+            scene, lines = self._field()
         scene.save(self.out, overwrite=self.overwrite)
         print(f"{lines}\nscene written to {self.out}")
 
@@ -89,16 +90,43 @@ class ImportField:
         line = f"{len(splats)} splats, SH degree {splats.sh_degree}{trained}; box {size}{around}; {cameras}"
         return Scene(splats, cameras=imported.cameras, background=imported.background), line
 
+    def _field(self) -> tuple[Scene, str]:
+        """The scene of a checkpoint that holds no splats, and a text report of its contents."""
+        from cagefield.formats.external.read_external import read_external
+
+        if self.up != "y-down" or self.unbounded != "auto" or self.axes is not None:
+            raise CagefieldError("--up, --axes and --unbounded are for splats; leave them out for a NeRF")
+        found = read_external(self.file, self.config)
+        return self._nerf() if found is None else self._external(found)
+
+    def _external(self, found: ExternalCheckpoint) -> tuple[Scene, str]:
+        """The scene of another program's checkpoint: voxels, or its field baked into voxels."""
+        from cagefield.cli.bake import bake_scene
+        from cagefield.compute import devices
+        from cagefield.fields.voxel_field import VoxelField
+        from cagefield.scene.import_external import cameras_of
+        from cagefield.scene.scene import Scene
+
+        if self.fov_deg is not None:
+            raise CagefieldError("--fov-deg is for a nerf-pytorch trained in NDC; leave it out here")
+        cameras = cameras_of(found, self._dataset())
+        lines = [found.description, *found.notes]
+        if isinstance(found.field, VoxelField):
+            return Scene(found.field, cameras=cameras, background=found.background), "\n".join(lines)
+        devices.start(self.device)
+        scene, figures = bake_scene(
+            found.field, cameras, found.background, self.baking, unbounded=found.field.unbounded
+        )
+        return scene, "\n".join([*lines, figures])
+
     def _nerf(self) -> tuple[Scene, str]:
-        """The baked scene of a checkpoint, and a text report of its contents."""
+        """The baked scene of a nerf-pytorch checkpoint, and a text report of its contents."""
         from cagefield.cli.bake import bake_scene
         from cagefield.compute import devices
         from cagefield.formats.nerf.nerf_pytorch import read_checkpoint
         from cagefield.formats.nerf.nerf_pytorch_config import SamplingSettings, find_config, read_config
         from cagefield.scene.import_nerf_pytorch import import_nerf
 
-        if self.up != "y-down" or self.unbounded != "auto" or self.axes is not None:
-            raise CagefieldError("--up, --axes and --unbounded are for splats; leave them out for a NeRF")
         found = read_checkpoint(self.file)
         config = self.config or find_config(self.file)
         settings = SamplingSettings() if config is None else read_config(config)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import tyro
 
 if TYPE_CHECKING:
+    from cagefield.fields.external.external_field import ExternalField
+    from cagefield.fields.nerf_field import NerfField
     from cagefield.fields.splat_field import SplatField
     from cagefield.fields.voxel_field import VoxelField
 
@@ -50,10 +52,7 @@ class Info:
         print(f"            {kind} {size} around {_point(field.center)}")
         print(f"            {details}, colour SH degree {field.sh_degree}")
         if scene.original is not None:
-            original = scene.original
-            print(f"original    NeRF: coarse {original.coarse}; fine {original.fine or 'none'}")
-            space = "NDC" if original.ndc else f"depth {original.near:.4g} to {original.far:.4g}"
-            print(f"            {original.samples[0]} + {original.samples[1]} samples a ray, {space}")
+            print("\n".join(_original(scene.original)))
         background = "none" if scene.background is None else _point(scene.background)
         print(f"background  {background}")
         for split, cameras in scene.cameras.items():
@@ -77,6 +76,19 @@ def _is_dataset(path: Path) -> bool:
     if not path.is_dir():
         return path.is_file()
     return camera_file(path) is not None or (path / POSES_FILE).is_file() or find_model(path) is not None
+
+
+def _original(original: NerfField | ExternalField) -> list[str]:
+    """Lines about the field that the voxels were baked from."""
+    from cagefield.fields.nerf_field import NerfField
+
+    if not isinstance(original, NerfField):
+        return [f"original    {original.describe()}"]
+    space = "NDC" if original.ndc else f"depth {original.near:.4g} to {original.far:.4g}"
+    return [
+        f"original    NeRF: coarse {original.coarse}; fine {original.fine or 'none'}",
+        f"            {original.samples[0]} + {original.samples[1]} samples a ray, {space}",
+    ]
 
 
 def _voxels(field: VoxelField) -> tuple[str, str]:

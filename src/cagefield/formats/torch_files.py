@@ -1,4 +1,8 @@
-"""PyTorch checkpoints, read without executing pickled code."""
+"""PyTorch checkpoints, read without executing pickled code.
+
+Tensors, plain values and NumPy arrays and scalars are read. NumPy's own constructors allocate whatever
+shape a pickle names; those used here allocate nothing before the bytes are there.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,8 @@ import warnings
 import zipfile
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from cagefield.errors import FieldError
 from cagefield.files.safe_open import UnreadableError, check_regular
@@ -38,7 +44,8 @@ def read_torch_tensors(path: Path) -> dict[str, Any]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # torch warns about pickles that are refused below
-            content = torch.load(path, map_location="cpu", weights_only=True)
+            with torch.serialization.safe_globals(_numpy_globals()):
+                content = torch.load(path, map_location="cpu", weights_only=True)
     except pickle.UnpicklingError as error:
         match = re.search(r"(?:GLOBAL|class|global) ([\w.]+)", str(error))
         class_name = f" ({match.group(1)})" if match else ""
@@ -57,6 +64,29 @@ def read_torch_tensors(path: Path) -> dict[str, Any]:
         raise FieldError(f"{path}: holds a {type(content).__name__}, expected a dict, as trainings save it")
     _check_sizes(path, content, path.stat().st_size)
     return content
+
+
+def _numpy_globals() -> list[Any]:
+    """NumPy's names in pickles, of versions 1 and 2, with what they stand for here."""
+    found: list[Any] = [np.ndarray, np.dtype]
+    found += [type(np.dtype(kind)) for kind in ("?", *np.typecodes["AllInteger"], *np.typecodes["Float"])]
+    for module in ("numpy.core.multiarray", "numpy._core.multiarray"):
+        found += [(_empty_array, f"{module}._reconstruct"), (_numpy_scalar, f"{module}.scalar")]
+    return found
+
+
+def _empty_array(*_: Any) -> np.ndarray[Any, Any]:
+    """Array without elements, to which unpickling gives its shape, type and bytes."""
+    return np.empty(0, np.uint8)
+
+
+def _numpy_scalar(kind: Any, raw: Any) -> Any:
+    """NumPy number of a type, from its bytes."""
+    number = np.dtype(kind)
+    if number.kind not in "biuf" or not isinstance(raw, (bytes, str)):
+        raise ValueError(f"a NumPy scalar of {number}")
+    content = raw.encode("latin-1") if isinstance(raw, str) else raw
+    return np.frombuffer(content, number, 1)[0]
 
 
 def _check_unpacked(path: Path) -> None:
@@ -84,8 +114,8 @@ def _check_sizes(path: Path, content: Any, file_bytes: int) -> None:
             pending.extend(value.values())
         elif isinstance(value, (list, tuple)):
             pending.extend(value)
-        elif hasattr(value, "numel") and hasattr(value, "element_size"):
-            tensor_bytes += int(value.numel()) * int(value.element_size())
+        elif isinstance(value, np.ndarray) or (hasattr(value, "numel") and hasattr(value, "element_size")):
+            tensor_bytes += int(value.nbytes)
             if tensor_bytes > 2 * file_bytes:
                 raise FieldError(
                     f"{path}: its tensors say that they hold {tensor_bytes} bytes or more, the "

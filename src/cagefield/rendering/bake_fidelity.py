@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cagefield.cameras.camera import Camera
+from cagefield.fields.external.external_field import ExternalField
 from cagefield.fields.nerf_field import NerfField
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
@@ -22,7 +23,10 @@ PIXELS = 2500
 
 
 def agreement(
-    original: NerfField | SplatField, voxels: VoxelField, cameras: Sequence[Camera], background: Background
+    original: NerfField | ExternalField | SplatField,
+    voxels: VoxelField,
+    cameras: Sequence[Camera],
+    background: Background,
 ) -> float:
     """Mean PSNR in dB over the cameras of the voxels' images against the original's, unedited.
 
@@ -57,19 +61,25 @@ def _against_splats(
 
 
 def _against_nerf(
-    original: NerfField,
+    original: NerfField | ExternalField,
     renderer: VoxelRenderer,
     cameras: Sequence[Camera],
     behind: tuple[float, float, float],
 ) -> list[float]:
+    from cagefield.rendering.external.external_renderer import trace_external
     from cagefield.rendering.nerf.nerf_renderer import Rays, trace
 
+    device = original.torch.device
     scores = []
     for camera in cameras:
         step = max(1, round((camera.width * camera.height / PIXELS) ** 0.5))
         j, i = np.meshgrid(np.arange(0, camera.height, step), np.arange(0, camera.width, step), indexing="ij")
         pixels = np.stack([i.ravel(), j.ravel()], axis=1)
-        rgb, opacity, _ = trace(original.torch, Rays.from_camera(camera, original.torch.device, pixels))
+        rays = Rays.from_camera(camera, device, pixels)
+        if isinstance(original, ExternalField):
+            rgb, opacity, _ = trace_external(original, rays)
+        else:
+            rgb, opacity, _ = trace(original.torch, rays)
         exact = rgb.cpu().numpy() + (1.0 - opacity.cpu().numpy()[:, None]) * np.array(behind, np.float32)
         frame = renderer.render(camera, background=behind)
         if frame is not None:

@@ -2,7 +2,7 @@
 
     SCENE/
       field.safetensors   the VoxelField or SplatField, in canonical space; the file says which
-      original.safetensors  the NerfField that it was baked from, if any, in the same space
+      original.safetensors  the NerfField or ExternalField that it was baked from, if any, in the same space
       edits.yaml          the edit stack, as a person would write it
       cameras.json        {"train": [...], "test": [...]}: cameras in world units, OpenGL camera-to-world
       scene.json          {"format": "cagefield-scene", "version": 1, "background": [r, g, b] or null,
@@ -41,9 +41,9 @@ from cagefield.edits.edit_files import dump_edits, load_edits
 from cagefield.edits.paste_paths import rebased
 from cagefield.edits.paste_placement import placed_paste
 from cagefield.errors import SceneError
+from cagefield.fields.external.external_field import ExternalField
 from cagefield.fields.frusta import in_frusta
 from cagefield.fields.nerf_field import NerfField
-from cagefield.fields.nerf_file import load_nerf, save_nerf
 from cagefield.fields.splat_field import NO_OFFSET, Offset, SplatField
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.files.atomic import replaced_file, replaced_folder
@@ -64,7 +64,9 @@ from cagefield.scene.scene_files import (
     read_cameras,
     read_field,
     read_manifest,
+    read_original,
     recover,
+    save_original,
     write_json,
 )
 from cagefield.typing import Array
@@ -114,7 +116,7 @@ class Scene:
     background: tuple[float, float, float] | None = (1.0, 1.0, 1.0)
     version: int = VERSION
     gains: tuple[tuple[float, float, float], ...] = ()
-    original: NerfField | None = None
+    original: NerfField | ExternalField | None = None
     preserve_opacity: bool = True
     folder: Path | None = None
     source_to_world: Array = dataclasses.field(default_factory=partial(np.eye, 4))
@@ -154,7 +156,7 @@ class Scene:
     @classmethod
     def baked(
         cls,
-        original: NerfField | SplatField,
+        original: NerfField | ExternalField | SplatField,
         cameras: Mapping[str, tuple[Camera, ...]],
         background: tuple[float, float, float] | None = (1.0, 1.0, 1.0),
         *,
@@ -166,16 +168,16 @@ class Scene:
         """The scene of a field's voxels, unedited; of an `unbounded` one the region that the cameras see is
         baked.
 
-        A NerfField is kept beside its voxels, splats are not.
+        A NerfField or an ExternalField is kept beside its voxels, splats are not.
 
         Raises:
             FieldError: options outside their range, a field that is empty.
             SceneError: a field of another class.
         """
-        if not isinstance(original, NerfField | SplatField):
+        if not isinstance(original, NerfField | ExternalField | SplatField):
             raise SceneError(
-                f"the original must be a NerfField or a SplatField, got {type(original).__name__}; "
-                "of another field make Scene(bake(field))"
+                "the original must be a NerfField, an ExternalField or a SplatField, got "
+                f"{type(original).__name__}; of another field make Scene(bake(field))"
             )
         from cagefield.fields.baking import bake
 
@@ -185,7 +187,7 @@ class Scene:
                 stacklevel=2,
             )
         every = [camera for group in cameras.values() for camera in group]
-        near = original.near if isinstance(original, NerfField) and original.ndc is None else 0.0
+        near = 0.0 if isinstance(original, SplatField) or getattr(original, "ndc", None) else original.near
         voxels = bake(
             original,
             resolution,
@@ -195,7 +197,7 @@ class Scene:
             visible=partial(in_frusta, every, near=near) if unbounded and every else None,
             on_progress=on_progress,
         )
-        kept = original if isinstance(original, NerfField) else None
+        kept = None if isinstance(original, SplatField) else original
         return cls(voxels, cameras=cameras, background=background, original=kept)
 
     @classmethod
@@ -217,7 +219,7 @@ class Scene:
         cameras = read_cameras(folder / CAMERAS)
         edits = load_edits(folder / EDITS, check=False, mend=True)
         field = read_field(folder / FIELD)
-        original = load_nerf(folder / ORIGINAL) if (folder / ORIGINAL).exists() else None
+        original = read_original(folder / ORIGINAL) if (folder / ORIGINAL).exists() else None
         try:
             return cls(
                 field,
@@ -256,7 +258,7 @@ class Scene:
                     (draft / name).write_text(text, encoding="utf-8")
             self.field.save(draft / FIELD)
             if self.original is not None:
-                save_nerf(self.original, draft / ORIGINAL)
+                save_original(self.original, draft / ORIGINAL)
             edits = EditStack(rebased(self.edits, self.folder, target))
             (draft / EDITS).write_text(dump_edits(edits), encoding="utf-8")
             write_json(
@@ -395,13 +397,17 @@ class Scene:
             far=far,
         )
 
-    def _original_renderer(self, original: NerfField) -> Renderer:
+    def _original_renderer(self, original: NerfField | ExternalField) -> Renderer:
         original.torch  # noqa: B018  a missing PyTorch is an error with its cure here
-        from cagefield.rendering.nerf.nerf_renderer import NerfRenderer
-
         # Patches are voxels: too rough for what a continuous edit bends, and for parts with soft seams.
         edits = [edit.replace(feather=0.0) if edit.feather else edit for edit in self.edits]
         exact = self.patcher.prepare(edits, relight_continuous=False).without_lattices()
+        if isinstance(original, ExternalField):
+            from cagefield.rendering.external.external_renderer import ExternalRenderer
+
+            return ExternalRenderer(original, exact, self.preserve_opacity)
+        from cagefield.rendering.nerf.nerf_renderer import NerfRenderer
+
         return NerfRenderer(original, exact, self.preserve_opacity)
 
     @cached_property

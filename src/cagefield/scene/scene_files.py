@@ -9,7 +9,11 @@ from typing import Any
 
 from cagefield.cameras.camera import Camera
 from cagefield.errors import CagefieldError, SceneError
+from cagefield.fields.external.external_field import ExternalField
+from cagefield.fields.external.external_file import KINDS, load_external, save_external
 from cagefield.fields.field_files import read_field_kind
+from cagefield.fields.nerf_field import NerfField
+from cagefield.fields.nerf_file import load_nerf, save_nerf
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.files import json_text
@@ -139,6 +143,24 @@ def read_field(path: Path) -> VoxelField | SplatField:
     if kind == "SplatField":
         return SplatField.load(path)
     return VoxelField.load(path)
+
+
+def read_original(path: Path) -> NerfField | ExternalField:
+    """The field that a scene's voxels were baked from, of the kind that the file's header names.
+
+    Raises:
+        FieldError: the file is damaged, of a kind that is not read or of a newer version.
+    """
+    kind = read_field_kind(path)
+    return load_external(path, kind) if kind in KINDS else load_nerf(path)
+
+
+def save_original(field: NerfField | ExternalField, path: Path) -> None:
+    """Writes the field that a scene's voxels were baked from."""
+    if isinstance(field, ExternalField):
+        save_external(field, path)
+    else:
+        save_nerf(field, path)
 
 
 def read_cameras(path: Path) -> dict[str, tuple[Camera, ...]]:

@@ -28,6 +28,7 @@ from cagefield.fields.mlp import NerfParameters
 from cagefield.fields.nerf_field import NerfField
 from cagefield.fields.nerf_torch import TorchMlp, TorchNerf
 from cagefield.images.render_result import Background, RenderResult
+from cagefield.rendering.nerf.sample_normals import sample_normals
 from cagefield.rendering.nerf.torch_edit_map import TensorMap
 
 ENDLESS = 1e10
@@ -38,9 +39,6 @@ LAST_NDC = 1.0 - 1e-6
 
 LEAST_COSINE = 0.05
 """Rays further from the camera's axis are sampled as if they were this close to it."""
-
-NORMAL_WEIGHT = 1e-4
-"""Samples that contribute less than this to a pixel do not get a normal."""
 
 
 class Rays(NamedTuple):
@@ -144,19 +142,7 @@ def _traced(
 
 def _normals(field: TorchNerf, rays: Rays, sums: Sums, mapped: TensorMap | None) -> Tensor:
     """Unit normals [N,3] in deformed space, 0 where nothing is seen."""
-    seen = sums.weights > NORMAL_WEIGHT
-    rows = torch.nonzero(seen)[:, 0]
-    points = rays.origins[rows] + sums.t[seen][:, None] * rays.directions[rows]
-    viewdirs = rays.directions[rows]
-    if mapped is None:
-        slopes = field.density_gradient(points, viewdirs)
-    else:
-        canonical, along, _ = mapped(points, viewdirs)
-        slopes = (mapped.jacobian(points) * field.density_gradient(canonical, along)[:, :, None]).sum(dim=1)
-    # slopes far away in NDC are tiny
-    own = -torch.nn.functional.normalize(slopes, dim=1, eps=1e-30) * sums.weights[seen][:, None]
-    total = torch.zeros_like(rays.origins).index_add_(0, rows, own)
-    return torch.nn.functional.normalize(total, dim=1)
+    return sample_normals(rays.origins, rays.directions, sums.t, sums.weights, field.density_gradient, mapped)
 
 
 def march(

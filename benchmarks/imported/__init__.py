@@ -1,0 +1,1 @@
+"""Fields of other programs: checkpoints made by their authors' own code, and comparisons with it."""

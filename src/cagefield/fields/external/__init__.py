@@ -1,0 +1,1 @@
+"""Fields that other programs trained, evaluated and sampled as those programs do."""

@@ -1,0 +1,1 @@
+"""Rendering of other programs' fields through edits."""
