@@ -7,6 +7,8 @@ from pathlib import Path
 
 from cagefield.errors import FieldError
 from cagefield.fields.external.external_field import ExternalField
+from cagefield.fields.external.instant_ngp import InstantNgpField
+from cagefield.fields.external.nerfacto import NerfactoField
 from cagefield.fields.external.tensorf import TensorfField
 from cagefield.fields.field_files import read_tensors, write_tensors
 from cagefield.files import json_text
@@ -15,7 +17,9 @@ FORMAT_VERSION = "1"
 
 _CURE = "copy it back or import the checkpoint again"
 
-KINDS: dict[str, type[ExternalField]] = {kind.KIND: kind for kind in (TensorfField,)}
+KINDS: dict[str, type[ExternalField]] = {
+    kind.KIND: kind for kind in (TensorfField, NerfactoField, InstantNgpField)
+}
 """Classes of fields by the kind in the header."""
 
 

@@ -54,11 +54,7 @@ class TorchHashGrid:
         """Rows [N] of the table for corners (i, j, k) of a level."""
         first, last = self.grid.offsets[level : level + 2]
         entries, resolution = last - first, self.grid.resolutions[level]
-        if (
-            self.grid.layout == "tcnn"
-            and resolution <= MAX_DENSE_RESOLUTION
-            and resolution**3 <= entries
-        ):
+        if self.grid.layout == "tcnn" and resolution <= MAX_DENSE_RESOLUTION and resolution**3 <= entries:
             return first + (i + j * resolution + k * resolution**2) % entries
         hashed = (i * HASH_PRIMES[0]) ^ (j * HASH_PRIMES[1]) ^ (k * HASH_PRIMES[2])
         return first + (hashed & _MODULUS) % entries

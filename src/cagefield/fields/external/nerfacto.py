@@ -108,13 +108,15 @@ class NerfactoField(ExternalField):
         fix("density_scale", number("average_init_density", self.density_scale, 1e-12, 1e12))
         fix("far", number("far_plane", self.far, 1e-6, 1e12))
         if self.spacing not in SPACINGS:
-            raise FieldError(f"proposal_initial_sampler is {self.spacing!r:.40}; expected piecewise or uniform")
+            raise FieldError(
+                f"proposal_initial_sampler is {self.spacing!r:.40}; expected piecewise or uniform"
+            )
         for name in ("contracted", "endless"):
             fix(name, bool(getattr(self, name)))
 
     @property
     def layout(self) -> str:
-        """"torch" or "tcnn", as of the hash grids."""
+        """ "torch" or "tcnn", as of the hash grids."""
         return self.base.grid.layout
 
     @property

@@ -2,7 +2,7 @@
 
     {"step": ..., "pipeline": {"_model.field.*": tensors, "_model.proposal_networks.N.*": ...}, ...}
 
-PyTorch layout: tables and weights by name (`mlp_base.model.0.hash_table`, `mlp_base.model.1.layers.0.weight`).
+PyTorch layout: tables and weights by name (`mlp_base.model.0.hash_table`, `mlp_head.layers.0.weight`).
 tiny-cuda-nn layout: one flat vector of parameters for each module, networks before grids, matrices [out, in]
 row by row without biases, inputs and outputs padded to multiples of 16 (8 for widths that are not fused).
 Padded inputs are 1 for a network alone, 0 behind a grid; here they become biases, or are dropped.
@@ -93,7 +93,9 @@ def read_nerfacto(content: Mapping[str, Any], path: Path, config: Path | None) -
         world = read_transforms(transforms)
     else:
         world = Similarity(np.eye(4), 1.0)
-        notes.append(f"{TRANSFORMS} is not beside the config: the data set's coordinates are taken as the field's")
+        notes.append(
+            f"{TRANSFORMS} is not beside the config: the data set's coordinates are taken as the field's"
+        )
     return ExternalCheckpoint(
         field,
         field.describe(),
@@ -124,7 +126,7 @@ def _notes(state: StateDict, settings: NerfactoSettings) -> list[str]:
 
 def _layers(state: StateDict, name: str) -> Layers | None:
     """Layers of a PyTorch MLP, or None where there is none."""
-    found = []
+    found: list[tuple[Any, Any]] = []
     while f"{name}.layers.{len(found)}.weight" in state:
         prefix = f"{name}.layers.{len(found)}"
         found.append((state.take(f"{prefix}.weight", 2), state.take(f"{prefix}.bias", 1)))
@@ -148,7 +150,9 @@ def _base(state: StateDict, settings: NerfactoSettings) -> HashNetwork:
     joint = _first(state, f"{base}.model.params", f"{base}.params")
     if joint is not None:
         flat = FlatParameters(state.take(joint, 1), joint)
-        layers = _flat_layers(flat, grid.levels * grid.features, settings.hidden, 1, 1 + GEOMETRY_FEATURES, 0.0)
+        layers = _flat_layers(
+            flat, grid.levels * grid.features, settings.hidden, 1, 1 + GEOMETRY_FEATURES, 0.0
+        )
         return HashNetwork(_flat_grid(flat, grid), layers)
     return _two_modules(
         state,
@@ -208,8 +212,8 @@ def _head(state: StateDict, settings: NerfactoSettings) -> Layers:
     (weight, bias), *more = layers
     if weight.shape[1] != inputs + len(appearance):
         raise FieldError(
-            f"{FIELD}.mlp_head takes {weight.shape[1]} inputs, expected {inputs} and {len(appearance)} of the "
-            "appearance embedding"
+            f"{FIELD}.mlp_head takes {weight.shape[1]} inputs, expected {inputs} and {len(appearance)} of "
+            "the appearance embedding"
         )
     folded = (bias + weight[:, inputs:] @ appearance).astype(np.float32)
     return ((np.ascontiguousarray(weight[:, :inputs]), folded), *more)
@@ -227,7 +231,9 @@ def _two_modules(
     name = _first(state, *(f"{module}.tcnn_encoding.params" for module in grids))
     network = _first(state, *(f"{module}.tcnn_encoding.params" for module in networks))
     if name is None or network is None:
-        raise FieldError(f"pipeline: neither {grids[0]}.hash_table nor {grids[0]}.tcnn_encoding.params is there")
+        raise FieldError(
+            f"pipeline: neither {grids[0]}.hash_table nor {grids[0]}.tcnn_encoding.params is there"
+        )
     flat = FlatParameters(state.take(network, 1), network)
     layers = _flat_layers(flat, grid.levels * grid.features, hidden, 1, outputs, 1.0)
     flat.check_end()
@@ -251,5 +257,3 @@ def _flat_layers(
 ) -> Layers:
     alignment = 16 if width in (16, 32, 64, 128) else 8
     return flat.layers(padded(inputs, alignment), inputs, width, hidden, outputs, alignment, padding)
-
-

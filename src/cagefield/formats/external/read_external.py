@@ -8,6 +8,8 @@ from typing import Any
 
 from cagefield.errors import FieldError
 from cagefield.formats.external.checkpoint import ExternalCheckpoint
+from cagefield.formats.external.instant_ngp import is_instant_ngp, read_instant_ngp
+from cagefield.formats.external.nerfacto import is_nerfacto, read_nerfacto
 from cagefield.formats.external.tensorf import is_tensorf, read_tensorf
 from cagefield.formats.torch_files import read_torch_tensors
 
@@ -26,7 +28,11 @@ def read_external(path: Path | str, config: Path | None = None) -> ExternalCheck
     """
     path = Path(path)
     try:
+        if is_instant_ngp(path):
+            return read_instant_ngp(path)
         content = read_torch_tensors(path)
+        if is_nerfacto(content):
+            return read_nerfacto(content, path, config)
         for test, reader in _TORCH:
             if test(content):
                 return reader(content)
