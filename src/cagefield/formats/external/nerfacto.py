@@ -127,7 +127,7 @@ def _notes(state: StateDict, settings: NerfactoSettings) -> list[str]:
 def _layers(state: StateDict, name: str) -> Layers | None:
     """Layers of a PyTorch MLP, or None where there is none."""
     found: list[tuple[Any, Any]] = []
-    while f"{name}.layers.{len(found)}.weight" in state:
+    while any(f"{name}.layers.{len(found)}.{part}" in state for part in ("weight", "bias")):
         prefix = f"{name}.layers.{len(found)}"
         found.append((state.take(f"{prefix}.weight", 2), state.take(f"{prefix}.bias", 1)))
     return tuple(found) or None

@@ -58,7 +58,7 @@ def open_splatfacto(path: Path) -> SplatSource:
 
 
 def is_splatfacto(path: Path) -> bool:
-    """Whether the file is a nerfstudio checkpoint, not of a network. Raises FieldError as `open_splatfacto`."""
+    """Whether the file is a nerfstudio checkpoint of no network. Raises FieldError as `open_splatfacto`."""
     if not path.is_file():
         return False
     pipeline = read_torch_tensors(path).get("pipeline")
