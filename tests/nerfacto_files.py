@@ -49,7 +49,13 @@ pipeline: !!python/object:nerfstudio.pipelines.base_pipeline.VanillaPipelineConf
     - 16
     proposal_initial_sampler: {spacing}
     proposal_net_args_list:
-    - &id002 {{hidden_dim: 16, log2_hashmap_size: 8, max_res: 8, num_levels: 2, base_res: 4, use_linear: false}}
+    - &id002
+      hidden_dim: 16
+      log2_hashmap_size: 8
+      max_res: 8
+      num_levels: 2
+      base_res: 4
+      use_linear: false
     - *id002
     use_average_appearance_embedding: {mean}
 """
