@@ -35,6 +35,7 @@ def main() -> None:
     parser.add_argument("--model", default="TensorVMSplit")
     parser.add_argument("--shading", default="MLP_Fea")
     parser.add_argument("--act", default="softplus")
+    parser.add_argument("--density-shift", type=float, default=-10.0)
     parser.add_argument("--density", type=int, nargs="+", default=[4, 4, 4])
     parser.add_argument("--appearance", type=int, nargs="+", default=[8, 8, 8])
     parser.add_argument("--iterations", type=int, default=300)
@@ -69,7 +70,7 @@ def _train(options: argparse.Namespace) -> Any:
 
     dataset = load_dataset(options.data)
     rays = torch.cat([rays_of(view.camera) for view in dataset.train])
-    colors = torch.cat([torch.from_numpy(_over_white(view.load())) for view in dataset.train])
+    colors = torch.cat([torch.from_numpy(over_white(view.load())) for view in dataset.train])
     box = torch.tensor([[-1.5] * 3, [1.5] * 3])
     start = 32**3
     model = getattr(tensoRF, options.model)(
@@ -83,7 +84,7 @@ def _train(options: argparse.Namespace) -> Any:
         shadingMode=options.shading,
         fea2denseAct=options.act,
         alphaMask_thres=1e-4,
-        density_shift=-10.0 if options.act == "softplus" else 0.0,
+        density_shift=options.density_shift if options.act == "softplus" else 0.0,
         distance_scale=25.0,
         pos_pe=6,
         view_pe=2,
@@ -105,7 +106,7 @@ def _train(options: argparse.Namespace) -> Any:
         optimizer.step()
         if iteration % 50 == 0:
             print(iteration, f"{-10 * math.log10(loss.item()):.2f} dB", flush=True)
-        if iteration in masking and options.model != "TensorVM":
+        if iteration in masking and options.model != "TensorVM" and _opaque(model):
             found = model.updateAlphaMask(tuple(model.gridSize.tolist()))
             if iteration == masking[0]:
                 model.shrink(found)
@@ -116,6 +117,11 @@ def _train(options: argparse.Namespace) -> Any:
     return model
 
 
+def _opaque(model: Any) -> bool:
+    """Whether anything is opaque enough for the alpha mask; it must not be empty."""
+    return bool((model.getDenseAlpha()[0] > model.alphaMask_thres).any())
+
+
 def _resolution(voxels: int, box: torch.Tensor) -> list[int]:
     """Vertices along each axis of about so many cubic voxels in a box [2,3]."""
     size = (box[1] - box[0]).tolist()
@@ -123,8 +129,8 @@ def _resolution(voxels: int, box: torch.Tensor) -> list[int]:
     return [int(length / edge) for length in size]
 
 
-def _over_white(image: np.ndarray) -> np.ndarray:
-    """rgb [H*W,3] in [0,1] of a photo of 3 or 4 channels."""
+def over_white(image: np.ndarray) -> np.ndarray:
+    """Colors [H*W,3] in [0,1] over white of a photo of 3 or 4 channels."""
     values = image.astype(np.float32) / (255.0 if image.dtype == np.uint8 else 1.0)
     if values.shape[-1] == 4:
         values = values[..., :3] * values[..., 3:] + 1.0 - values[..., 3:]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataset_readers import DATASET_READERS
 from editor_readers import EDITOR_READERS
+from hash_grid_readers import HASH_GRID_NEED_TORCH, HASH_GRID_READERS
 from message_readers import MESSAGE_READERS
 from network_readers import NETWORK_READERS
 from poses_readers import POSES_READERS
@@ -16,6 +17,7 @@ from training_readers import TRAINING_READERS
 READERS: dict[str, Reader] = {
     **SCENE_READERS,
     **NETWORK_READERS,
+    **HASH_GRID_READERS,
     **DATASET_READERS,
     **PROGRAM_READERS,
     **SPLAT_READERS,
@@ -35,6 +37,7 @@ NEED_TORCH = (
     "splatfacto .ckpt",
     "splatfacto .ckpt, old",
     "training, nerf",
+    *HASH_GRID_NEED_TORCH,
 )
 
 NEED_OPENSSL = ("certificate",)

@@ -43,6 +43,8 @@ class ImportField:
     """Config of a NeRF's training; args.txt, config.txt or config.yml beside the checkpoint if left out."""
     fov_deg: float | None = None
     """Horizontal field of view of a NeRF's forward-facing photos, where --data is left out."""
+    data_scale: float | None = None
+    """Factor of the data set's camera positions in the training of svox2 (scene_scale), 2/3 if left out."""
     downscale: int | None = None
     """Shrink the data set's photos by this factor; left out, until their longer side is 800 or less."""
     baking: Baking = field(default_factory=BakingOptions)
@@ -105,11 +107,13 @@ class ImportField:
         from cagefield.cli.bake import bake_scene
         from cagefield.compute import devices
         from cagefield.fields.voxel_field import VoxelField
-        from cagefield.scene.import_external import cameras_of
+        from cagefield.scene.import_external import cameras_of, with_data_scale
         from cagefield.scene.scene import Scene
 
         if self.fov_deg is not None:
             raise CagefieldError("--fov-deg is for a nerf-pytorch trained in NDC; leave it out here")
+        if self.data_scale is not None:
+            found = with_data_scale(found, self.data_scale)
         cameras = cameras_of(found, self._dataset())
         lines = [found.description, *found.notes]
         if isinstance(found.field, VoxelField):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import zipfile
+from collections.abc import Collection
 from pathlib import Path
 from typing import IO, Any
 
@@ -18,10 +19,11 @@ DEFLATED = 1040
 """How many times as much a deflated file can hold, at most."""
 
 
-def read_arrays(path: Path, times: int = 1) -> dict[str, NDArray[Any]]:
+def read_arrays(path: Path, times: int = 1, names: Collection[str] | None = None) -> dict[str, NDArray[Any]]:
     """The arrays of a file that `numpy.savez` wrote; all of them take no more memory than the file.
 
-    With `times` they may take that many times as much (`DEFLATED`: of `numpy.savez_compressed`).
+    With `times` they may take that many times as much (`DEFLATED`: of `numpy.savez_compressed`). With `names`
+    only those are read.
 
     Other archives hold none: a checkpoint of PyTorch's, say.
 
@@ -31,6 +33,8 @@ def read_arrays(path: Path, times: int = 1) -> dict[str, NDArray[Any]]:
         with open_regular(path) as file, zipfile.ZipFile(file) as archive:
             size = path.stat().st_size
             entries = [entry for entry in archive.infolist() if entry.filename.endswith(".npy")]
+            if names is not None:
+                entries = [entry for entry in entries if entry.filename.removesuffix(".npy") in names]
             unpacked = sum(entry.file_size for entry in entries)
             if unpacked > times * size:
                 raise ValueError(f"it says that it unpacks to {unpacked} bytes")
@@ -41,6 +45,27 @@ def read_arrays(path: Path, times: int = 1) -> dict[str, NDArray[Any]]:
         raise
     except Exception as error:  # zipfile and numpy raise their own classes, and many others, on damage
         raise ValueError(" ".join(str(error).split()) or type(error).__name__) from error
+
+
+def array_headers(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+    """(shape, type) of the arrays of a file that `numpy.savez` wrote, without their values.
+
+    Raises ValueError for a damaged file or one without arrays, OSError where it cannot be read.
+    """
+    try:
+        with open_regular(path) as file, zipfile.ZipFile(file) as archive:
+            headers = {}
+            for entry in archive.infolist():
+                if entry.filename.endswith(".npy"):
+                    with archive.open(entry) as stream:
+                        headers[entry.filename.removesuffix(".npy")] = _header_of(stream)
+    except OSError:
+        raise
+    except Exception as error:  # zipfile and numpy raise their own classes, and many others, on damage
+        raise ValueError(" ".join(str(error).split()) or type(error).__name__) from error
+    if not headers:
+        raise ValueError("it holds no arrays")
+    return headers
 
 
 def read_array(path: Path) -> NDArray[Any]:
@@ -86,6 +111,12 @@ def _values(stream: IO[bytes]) -> NDArray[Any]:
 
 def _bytes_of(stream: IO[bytes]) -> int:
     """Bytes of the array whose header is read."""
+    shape, numbers = _header_of(stream)
+    return math.prod(shape) * numbers.itemsize
+
+
+def _header_of(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """(shape, type) of the array whose header is read."""
     readers = {
         (1, 0): np.lib.format.read_array_header_1_0,
         (2, 0): np.lib.format.read_array_header_2_0,
@@ -96,4 +127,4 @@ def _bytes_of(stream: IO[bytes]) -> int:
     shape, _, numbers = readers[version](stream)
     if numbers.hasobject or numbers.itemsize == 0 or any(length < 0 for length in shape):
         raise ValueError(f"an array of {numbers}, {shape}")
-    return math.prod(shape) * numbers.itemsize
+    return shape, numbers

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.datasets.transforms.transforms_json import remove_scale
+from cagefield.fields.external.external_field import number
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
@@ -16,6 +18,16 @@ if TYPE_CHECKING:
 
 ORBIT_FOV = 0.6911112070083618
 """Horizontal field of view of cameras on an orbit, radians: that of the NeRF-synthetic scenes."""
+
+
+def with_data_scale(checkpoint: ExternalCheckpoint, scale: float) -> ExternalCheckpoint:
+    """Checkpoint whose training multiplied the data set's camera positions by another factor.
+
+    Raises:
+        FieldError: a factor that is not from 1e-6 to 1e6.
+    """
+    world = dataclasses.replace(checkpoint.world, scale=number("data scale", scale, 1e-6, 1e6))
+    return dataclasses.replace(checkpoint, world=world)
 
 
 def cameras_of(checkpoint: ExternalCheckpoint, dataset: Dataset | None) -> dict[str, tuple[Camera, ...]]:

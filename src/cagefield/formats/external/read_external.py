@@ -6,17 +6,30 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cagefield.errors import FieldError
-from cagefield.formats.external.checkpoint import ExternalCheckpoint
+from cagefield.files.npz import array_headers
+from cagefield.files.safe_open import UnreadableError, check_regular
+from cagefield.formats.external.checkpoint import ExternalCheckpoint, format_names
 from cagefield.formats.external.instant_ngp import is_instant_ngp, read_instant_ngp
 from cagefield.formats.external.nerfacto import is_nerfacto, read_nerfacto
+from cagefield.formats.external.svox2 import is_svox2, read_svox2
 from cagefield.formats.external.tensorf import is_tensorf, read_tensorf
 from cagefield.formats.torch_files import read_torch_tensors
+
+Headers = dict[str, tuple[tuple[int, ...], np.dtype[Any]]]
+"""(shape, type) of the arrays of an .npz by name."""
 
 _TORCH: tuple[
     tuple[Callable[[Mapping[str, Any]], bool], Callable[[Mapping[str, Any]], ExternalCheckpoint]], ...
 ] = ((is_tensorf, read_tensorf),)
 """(test, reader) of dictionaries that `torch.save` wrote."""
+
+_NPZ: tuple[tuple[Callable[[Headers], bool], Callable[[Path, Headers], ExternalCheckpoint]], ...] = (
+    (is_svox2, read_svox2),
+)
+"""(test, reader) of files that `numpy.savez` wrote."""
 
 
 def read_external(path: Path | str, config: Path | None = None) -> ExternalCheckpoint | None:
@@ -30,6 +43,8 @@ def read_external(path: Path | str, config: Path | None = None) -> ExternalCheck
     try:
         if is_instant_ngp(path):
             return read_instant_ngp(path)
+        if path.suffix.lower() == ".npz":
+            return _read_npz(path)
         content = read_torch_tensors(path)
         if is_nerfacto(content):
             return read_nerfacto(content, path, config)
@@ -40,3 +55,22 @@ def read_external(path: Path | str, config: Path | None = None) -> ExternalCheck
         message = str(error)
         raise FieldError(message if message.startswith(str(path)) else f"{path}: {message}") from None
     return None
+
+
+def _read_npz(path: Path) -> ExternalCheckpoint:
+    try:
+        check_regular(path)
+        headers = array_headers(path)
+        for test, reader in _NPZ:
+            if test(headers):
+                return reader(path, headers)
+    except UnreadableError as error:
+        raise FieldError(f"{path}: {error}") from None
+    except (ValueError, OSError) as error:
+        if isinstance(error, FieldError):
+            raise
+        reason = getattr(error, "strerror", None) or str(error)
+        raise FieldError(f"{path}: not a readable .npz ({reason:.160}); copy it again") from error
+    raise FieldError(
+        f"{path}: no field that is read: it holds {format_names(headers)}; expected those of svox2"
+    )
