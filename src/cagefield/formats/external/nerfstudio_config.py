@@ -90,7 +90,7 @@ class GridSettings:
         return float(np.exp((np.log(self.finest) - np.log(self.base)) / (self.levels - 1)))
 
     @classmethod
-    def of(cls, values: Any, levels: int, finest: int, log2_size: int) -> GridSettings:
+    def from_options(cls, values: Any, levels: int, finest: int, log2_size: int) -> GridSettings:
         """Settings of a mapping of the config, with nerfstudio's defaults for missing keys."""
         if not isinstance(values, dict):
             raise FieldError(f"options of a network must be a mapping, got {type(values).__name__}")
@@ -164,8 +164,8 @@ def nerfacto_settings(config: dict[str, Any]) -> NerfactoSettings:
     networks = 1 if flag("use_same_proposal_network", False) else rounds
     chosen = [listed[min(index, len(listed) - 1)] for index in range(networks)]
     return NerfactoSettings(
-        grid=GridSettings.of(model, 16, 2048, 19),
-        proposal_grids=tuple(GridSettings.of(entry, 8, 1024, 18) for entry in chosen),
+        grid=GridSettings.from_options(model, 16, 2048, 19),
+        proposal_grids=tuple(GridSettings.from_options(entry, 8, 1024, 18) for entry in chosen),
         hidden=whole_number("hidden_dim", model.get("hidden_dim", 64), 1, 1 << 12),
         hidden_color=whole_number("hidden_dim_color", model.get("hidden_dim_color", 64), 1, 1 << 12),
         proposal_hidden=tuple(
