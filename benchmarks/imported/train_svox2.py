@@ -24,7 +24,7 @@ from cagefield.cameras.camera import Camera
 from cagefield.datasets import load_dataset
 from cagefield.formats.external.svox2 import SCENE_SCALE
 
-BATCH = 512
+BATCH = 256
 
 
 def main() -> None:
@@ -33,7 +33,8 @@ def main() -> None:
     parser.add_argument("sources", type=Path)
     parser.add_argument("data", type=Path)
     parser.add_argument("-o", "--out", type=Path, required=True)
-    parser.add_argument("--iterations", type=int, default=150)
+    parser.add_argument("--iterations", type=int, default=30)
+    parser.add_argument("--views", type=int, default=2)
     parser.add_argument("--cells", type=int, nargs=3, default=[36, 32, 44])
     options = parser.parse_args()
     torch.manual_seed(0)
@@ -48,7 +49,7 @@ def main() -> None:
     )
     grid.density_data.data[:] = 0.5
     optimizer = torch.optim.Adam(
-        [{"params": grid.density_data, "lr": 1.0}, {"params": grid.sh_data, "lr": 0.03}]
+        [{"params": grid.density_data, "lr": 3.0}, {"params": grid.sh_data, "lr": 0.1}]
     )
     for iteration in range(options.iterations):
         rows = torch.randint(0, len(rays), (BATCH,))
@@ -57,14 +58,14 @@ def main() -> None:
         optimizer.zero_grad()
         (loss + 1e-5 * torch.relu(grid.density_data).mean()).backward()
         optimizer.step()
-        if iteration % 25 == 0:
+        if iteration % 10 == 0:
             print(iteration, f"{-10 * math.log10(loss.item()):.2f} dB", flush=True)
     _prune(grid)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     grid.save(str(options.out), compress=True)
     # its file has float16 colors
     grid = svox2.SparseGrid.load(str(options.out))
-    cameras = [view.camera for view in dataset.test]
+    cameras = [view.camera for view in dataset.test[: options.views]]
     pictures = []
     with torch.no_grad():
         for camera in cameras:

@@ -1,0 +1,69 @@
+"""Checkpoints of other programs' fields, and the files of scenes that keep them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from reader_seeds import Reader
+
+from svox2_files import svox2_arrays, write_svox2
+from tensorf_files import tensorf_content, write_tensorf
+
+
+def _read(name: str) -> Callable[[Path], Any]:
+    """As `cagefield import` reads it, but for the baking."""
+
+    def read(folder: Path) -> None:
+        from cagefield.formats.external.read_external import read_external
+        from cagefield.scene.import_external import cameras_of
+
+        found = read_external(folder / name)
+        if found is not None:
+            cameras_of(found, None)
+
+    return read
+
+
+def _tensorf(model: str, shading: str) -> Callable[[Path], None]:
+    def make(folder: Path) -> None:
+        write_tensorf(folder / "a.th", tensorf_content(model, shading))
+
+    return make
+
+
+def _make_field(folder: Path) -> None:
+    from cagefield.fields.external.external_file import save_external
+    from cagefield.formats.external.read_external import read_external
+
+    write_tensorf(folder / "b.th", tensorf_content())
+    found = read_external(folder / "b.th")
+    (folder / "b.th").unlink()
+    save_external(found.field, folder / "a.safetensors")  # type: ignore[union-attr, arg-type]
+
+
+def _read_field(folder: Path) -> None:
+    from cagefield.scene.scene_files import read_original
+
+    read_original(folder / "a.safetensors")
+
+
+def _svox2(compress: bool, **changes: Any) -> Callable[[Path], None]:
+    def make(folder: Path) -> None:
+        write_svox2(folder / "a.npz", svox2_arrays(**changes), compress)
+
+    return make
+
+
+_BACKGROUND = {"background_data": np.zeros((8, 4, 4), np.float32), "background_links": np.zeros((4, 2), int)}
+
+EXTERNAL_READERS: dict[str, Reader] = {
+    "TensoRF .th": Reader(_tensorf("TensorVMSplit", "MLP_Fea"), _read("a.th"), {"a.th": "zip"}),
+    "TensoRF .th, lines": Reader(_tensorf("TensorCP", "SH"), _read("a.th"), {"a.th": "zip"}),
+    "original, TensoRF": Reader(_make_field, _read_field, {"a.safetensors": "safetensors"}),
+    "svox2 .npz": Reader(_svox2(False), _read("a.npz"), {"a.npz": "zip"}),
+    "svox2 .npz, deflated": Reader(_svox2(True, **_BACKGROUND), _read("a.npz"), {"a.npz": "zip"}),
+}
+EXTERNAL_NEED_TORCH = ("TensoRF .th", "TensoRF .th, lines", "original, TensoRF")
