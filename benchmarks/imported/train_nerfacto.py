@@ -7,7 +7,7 @@
 
 Model, losses, sampling, config.yml and checkpoint are nerfstudio's; the loop below only steps optimizers.
 Beside the checkpoint's folder, renders.npz has views as nerfstudio renders them: rgbN [H,W,3], accN [H,W,1],
-c2wN [3,4] and kN (fx, fy, cx, cy, width, height).
+c2wN [3,4] and kN (fx, fy, cx, cy, width, height); step-*_pictures.npz has rgb [V,H,W,3] for `external_fields`.
 """
 
 from __future__ import annotations
@@ -36,14 +36,18 @@ def main() -> None:
     config = _config(options)
     config.save_config()
     config.pipeline.datamanager.data = options.data
-    pipeline = config.pipeline.setup(device="cpu", test_mode="val", world_size=1, local_rank=0)
+    pipeline = config.pipeline.setup(device="cpu", test_mode="test", world_size=1, local_rank=0)
     folder = config.get_base_dir()
     pipeline.datamanager.train_dataparser_outputs.save_dataparser_transform(
         folder / "dataparser_transforms.json"
     )
     optimizers = _train(pipeline, options.iterations)
     _save(config, pipeline, optimizers, options.iterations)
-    np.savez(folder / "renders.npz", **_renders(pipeline))
+    views = _renders(pipeline)
+    np.savez(folder / "renders.npz", **views)
+    pictures = np.stack([views[f"rgb{index}"] for index in range(len(views) // 4)])
+    models = folder / "nerfstudio_models"
+    np.savez(models / f"step-{options.iterations - 1:09d}_pictures.npz", rgb=pictures)
     print(folder)
 
 
