@@ -7,7 +7,8 @@
 
 Model, losses, sampling, config.yml and checkpoint are nerfstudio's; the loop below only steps optimizers.
 Beside the checkpoint's folder, renders.npz has views as nerfstudio renders them: rgbN [H,W,3], accN [H,W,1],
-c2wN [3,4] and kN (fx, fy, cx, cy, width, height); step-*_pictures.npz has rgb [V,H,W,3] for `external_fields`.
+c2wN [3,4] and kN (fx, fy, cx, cy, width, height). step-*_pictures.npz has rgb [V,H,W,3] for
+`external_fields`.
 """
 
 from __future__ import annotations
