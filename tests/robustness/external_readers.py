@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from reader_seeds import Reader
 
+from plenoctree_files import plenoctree_arrays, write_plenoctree
 from svox2_files import svox2_arrays, write_svox2
 from tensorf_files import tensorf_content, write_tensorf
 
@@ -57,12 +58,17 @@ def _svox2(compress: bool, **changes: Any) -> Callable[[Path], None]:
     return make
 
 
+def _plenoctree(folder: Path) -> None:
+    write_plenoctree(folder / "a.npz", plenoctree_arrays())
+
+
 _BACKGROUND = {"background_data": np.zeros((8, 4, 4), np.float32), "background_links": np.zeros((4, 2), int)}
 
 EXTERNAL_READERS: dict[str, Reader] = {
     "TensoRF .th": Reader(_tensorf("TensorVMSplit", "MLP_Fea"), _read("a.th"), {"a.th": "zip"}),
     "TensoRF .th, lines": Reader(_tensorf("TensorCP", "SH"), _read("a.th"), {"a.th": "zip"}),
     "original, TensoRF": Reader(_make_field, _read_field, {"a.safetensors": "safetensors"}),
+    "PlenOctree .npz": Reader(_plenoctree, _read("a.npz"), {"a.npz": "zip"}),
     "svox2 .npz": Reader(_svox2(False), _read("a.npz"), {"a.npz": "zip"}),
     "svox2 .npz, deflated": Reader(_svox2(True, **_BACKGROUND), _read("a.npz"), {"a.npz": "zip"}),
 }

@@ -28,7 +28,7 @@ class ImportField:
     """
 
     file: tyro.conf.Positional[Path]
-    """Splats, or a checkpoint: nerfstudio's splatfacto or nerfacto, nerf-pytorch, TensoRF, Instant-NGP."""
+    """Splats, or a checkpoint: splatfacto, nerfacto, nerf-pytorch, TensoRF, Instant-NGP, svox2 or svox."""
     out: Output
     """Scene folder."""
     data: Path | None = None

@@ -14,6 +14,7 @@ from cagefield.files.safe_open import UnreadableError, check_regular
 from cagefield.formats.external.checkpoint import ExternalCheckpoint, format_names
 from cagefield.formats.external.instant_ngp import is_instant_ngp, read_instant_ngp
 from cagefield.formats.external.nerfacto import is_nerfacto, read_nerfacto
+from cagefield.formats.external.plenoctree import is_plenoctree, read_plenoctree
 from cagefield.formats.external.svox2 import is_svox2, read_svox2
 from cagefield.formats.external.tensorf import is_tensorf, read_tensorf
 from cagefield.formats.torch_files import read_torch_tensors
@@ -28,6 +29,7 @@ _TORCH: tuple[
 
 _NPZ: tuple[tuple[Callable[[Headers], bool], Callable[[Path, Headers], ExternalCheckpoint]], ...] = (
     (is_svox2, read_svox2),
+    (is_plenoctree, read_plenoctree),
 )
 """(test, reader) of files that `numpy.savez` wrote."""
 
@@ -72,5 +74,5 @@ def _read_npz(path: Path) -> ExternalCheckpoint:
         reason = getattr(error, "strerror", None) or str(error)
         raise FieldError(f"{path}: not a readable .npz ({reason:.160}); copy it again") from error
     raise FieldError(
-        f"{path}: no field that is read: it holds {format_names(headers)}; expected those of svox2"
+        f"{path}: no field that is read: it holds {format_names(headers)}; expected those of svox2 or svox"
     )
