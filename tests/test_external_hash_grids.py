@@ -48,7 +48,7 @@ def test_moved_content_looks_as_from_a_camera_moved_along(tmp_path: Path, make, 
     plain = ExternalRenderer(field).render(camera, background="black")
     assert plain.opacity.max() > 0.2 and plain.rgb.std() > 0.02
     pose[:3, 3] += shift
-    edits = EditStack([Edit.move(Cage.box(middle, 0.51 * size)).translate(tuple(shift))])
+    edits = EditStack([Edit.move(Cage.box(middle, 1.02 * size)).translate(tuple(shift))])
     moved = ExternalRenderer(field, edits).render(Camera.from_fov(pose, 8, 6, 0.7), background="black")
     np.testing.assert_allclose(moved.opacity, plain.opacity, atol=tolerance)
     np.testing.assert_allclose(moved.rgb, plain.rgb, atol=tolerance)

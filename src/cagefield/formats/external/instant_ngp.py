@@ -300,6 +300,7 @@ def _cameras(dataset: dict[str, Any], field: InstantNgpField, notes: list[str]) 
     """The training cameras in the field's world; a note tells of lenses that are not read."""
     poses, lenses = dataset.get("xforms", []), dataset.get("metadata", [])
     if not isinstance(poses, list) or not isinstance(lenses, list) or len(poses) != len(lenses):
+        notes.append("left out: the training cameras, whose poses and lenses differ in number")
         return ()
     cameras, skipped = [], 0
     for pose, lens in zip(poses, lenses, strict=True):
