@@ -2,10 +2,10 @@
 
     python -m benchmarks.imported.external_fields DATA GENUINE... -o benchmarks/results/external_fields.md
 
-GENUINE are checkpoints from `train_tensorf` with their pictures beside them (.npz of rgb
-[V,H,W,3]: the first test views of DATA). Columns: the file; its first view by the authors' code against ours,
-every fourth pixel each way; one continuous and one discrete edit, exact against the baked voxels at SIZE x
-SIZE, with the processor time of one exact and one baked picture; the process's peak memory.
+GENUINE are checkpoints from `train_tensorf` and `train_nerfacto` with their pictures beside
+them (.npz of rgb [V,H,W,3]: the first test views of DATA). Columns: the file; its first view by the authors'
+code against ours, every fourth pixel each way; one continuous and one discrete edit, exact against the baked
+voxels at SIZE x SIZE, with the processor time of one exact and one baked picture; the process's peak memory.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataset_readers import DATASET_READERS
 from editor_readers import EDITOR_READERS
 from external_readers import EXTERNAL_NEED_TORCH, EXTERNAL_READERS
+from hash_grid_readers import HASH_GRID_NEED_TORCH, HASH_GRID_READERS
 from message_readers import MESSAGE_READERS
 from network_readers import NETWORK_READERS
 from poses_readers import POSES_READERS
@@ -18,6 +19,7 @@ READERS: dict[str, Reader] = {
     **SCENE_READERS,
     **NETWORK_READERS,
     **EXTERNAL_READERS,
+    **HASH_GRID_READERS,
     **DATASET_READERS,
     **PROGRAM_READERS,
     **SPLAT_READERS,
@@ -38,6 +40,7 @@ NEED_TORCH = (
     "splatfacto .ckpt, old",
     "training, nerf",
     *EXTERNAL_NEED_TORCH,
+    *HASH_GRID_NEED_TORCH,
 )
 
 NEED_OPENSSL = ("certificate",)

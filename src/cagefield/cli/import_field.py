@@ -28,7 +28,7 @@ class ImportField:
     """
 
     file: tyro.conf.Positional[Path]
-    """Splats, or a checkpoint of nerfstudio's splatfacto, nerf-pytorch, TensoRF, svox2 or svox."""
+    """Splats, or a checkpoint: splatfacto, nerfacto, nerf-pytorch, TensoRF, Instant-NGP, svox2 or svox."""
     out: Output
     """Scene folder."""
     data: Path | None = None
@@ -54,13 +54,14 @@ class ImportField:
 
     def run(self) -> None:
         """Read, bake where necessary, write, and print the contents."""
+        from cagefield.formats.external.instant_ngp import is_instant_ngp
         from cagefield.formats.splats.open_splats import holds_splats
         from cagefield.scene.scene_files import check_destination
 
         check_destination(self.out, self.overwrite)
         if self.fov_deg is not None and not 1.0 <= self.fov_deg <= 170.0:
             raise CagefieldError(f"--fov-deg is {self.fov_deg}; it must be from 1 to 170")
-        if holds_splats(self.file):
+        if not is_instant_ngp(self.file) and holds_splats(self.file):
             scene, lines = self._splats()
         else:
             scene, lines = self._field()

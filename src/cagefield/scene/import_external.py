@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cagefield.cameras.camera import Camera, turntable
+from cagefield.datasets.transforms.transforms_json import remove_scale
 from cagefield.fields.external.external_field import number
 
 if TYPE_CHECKING:
@@ -30,14 +31,16 @@ def with_data_scale(checkpoint: ExternalCheckpoint, scale: float) -> ExternalChe
 
 
 def cameras_of(checkpoint: ExternalCheckpoint, dataset: Dataset | None) -> dict[str, tuple[Camera, ...]]:
-    """Cameras by split: the data set's, in the field's world, or on an orbit around the field's box."""
+    """Cameras by split, in the field's world: the data set's, the checkpoint's, or those of an orbit."""
     if dataset is not None:
         splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
         return {
-            name: tuple(checkpoint.world.transform_camera(view.camera) for view in views)
+            name: tuple(_placed(view.camera, checkpoint, dataset) for view in views)
             for name, views in splits.items()
             if views
         }
+    if checkpoint.cameras:
+        return {"train": checkpoint.cameras, "test": checkpoint.cameras[::8]}
     lower, upper = checkpoint.field.bounds
     distance = checkpoint.distance
     if distance is None:
@@ -49,3 +52,10 @@ def cameras_of(checkpoint: ExternalCheckpoint, dataset: Dataset | None) -> dict[
         )
         for split, n in (("train", 24), ("test", 8))
     }
+
+
+def _placed(camera: Camera, checkpoint: ExternalCheckpoint, dataset: Dataset) -> Camera:
+    """A data set's camera in the field's world."""
+    if checkpoint.from_source:
+        camera = camera.with_c2w(remove_scale(np.linalg.inv(dataset.source_to_world) @ camera.c2w)[0])
+    return checkpoint.world.transform_camera(camera)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.cameras.camera import Camera
 from cagefield.datasets.nerf_normalization import Similarity
 from cagefield.errors import FieldError
 from cagefield.fields.external.external_field import ExternalField
@@ -27,6 +28,8 @@ class ExternalCheckpoint:
     background: color behind the training photos; None where there is nothing.
     world: map from the data set's coordinates to the field's.
     distance: typical distance of the training cameras from the box's center; None where unknown.
+    from_source: `world` begins at the coordinates of the reconstruction, before `Dataset.source_to_world`.
+    cameras: training cameras that the checkpoint holds, in the field's world.
     """
 
     field: ExternalField | VoxelField
@@ -35,6 +38,8 @@ class ExternalCheckpoint:
     background: tuple[float, float, float] | None = (1.0, 1.0, 1.0)
     world: Similarity = dataclasses.field(default_factory=lambda: Similarity(np.eye(4), 1.0))
     distance: float | None = None
+    from_source: bool = False
+    cameras: tuple[Camera, ...] = ()
 
 
 class StateDict:

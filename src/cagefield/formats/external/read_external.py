@@ -12,6 +12,8 @@ from cagefield.errors import FieldError
 from cagefield.files.npz import array_headers
 from cagefield.files.safe_open import UnreadableError, check_regular
 from cagefield.formats.external.checkpoint import ExternalCheckpoint, format_names
+from cagefield.formats.external.instant_ngp import is_instant_ngp, read_instant_ngp
+from cagefield.formats.external.nerfacto import is_nerfacto, read_nerfacto
 from cagefield.formats.external.plenoctree import is_plenoctree, read_plenoctree
 from cagefield.formats.external.svox2 import is_svox2, read_svox2
 from cagefield.formats.external.tensorf import is_tensorf, read_tensorf
@@ -41,9 +43,13 @@ def read_external(path: Path | str, config: Path | None = None) -> ExternalCheck
     """
     path = Path(path)
     try:
+        if is_instant_ngp(path):
+            return read_instant_ngp(path)
         if path.suffix.lower() == ".npz":
             return _read_npz(path)
         content = read_torch_tensors(path)
+        if is_nerfacto(content):
+            return read_nerfacto(content, path, config)
         for test, reader in _TORCH:
             if test(content):
                 return reader(content)

@@ -58,8 +58,14 @@ def open_splatfacto(path: Path) -> SplatSource:
 
 
 def is_splatfacto(path: Path) -> bool:
-    """Whether the file is a nerfstudio checkpoint. Raises FieldError as `open_splatfacto`."""
-    return path.is_file() and "pipeline" in read_torch_tensors(path)
+    """Whether the file is a nerfstudio checkpoint of no network. Raises FieldError as `open_splatfacto`."""
+    if not path.is_file():
+        return False
+    pipeline = read_torch_tensors(path).get("pipeline")
+    # Networks are those of a radiance field, such as nerfacto's; its reader is another one.
+    return pipeline is not None and not (
+        isinstance(pipeline, Mapping) and any(str(name).startswith("_model.field.") for name in pipeline)
+    )
 
 
 def _tensor(pipeline: Mapping[str, Any], name: str) -> AnyArray | None:
