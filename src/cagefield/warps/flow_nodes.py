@@ -7,6 +7,7 @@ import numpy as np
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Float32
 
+
 def flow_nodes(
     velocities: Float32, steps: Array, outer: Cage, frame: Array, iterations: int, resolution: int
 ) -> Float32:
@@ -15,7 +16,7 @@ def flow_nodes(
     velocities [K,G,G,G,3] and steps [K] of the flow; frame [7,3]: center, dz/dx, dx/dz of the outer cage;
     `iterations` of a step.
 
-    Half as many nodes along each axis and cubic interpolation between them were measured: 2.2 times the error.
+    Half as many nodes along each axis and cubic interpolation between them: 2.2 times the error, measured.
     """
     from cagefield.warps.kernels.lattice_nodes import flow_nodes_back
 

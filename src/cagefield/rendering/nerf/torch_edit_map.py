@@ -1,7 +1,7 @@
 """The map of an edit stack for tensors: the same kernel, on the device where the tensors are.
 
-Kernels have no exact map of lattices, control points and meshes: stacks with one of these that has no `lattice`
-are evaluated by the float64 reference, sample by sample, on the CPU.
+Kernels have no exact map of lattices, control points and meshes: stacks with one of these without a
+`lattice` are evaluated by the float64 reference, sample by sample, on the CPU.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class TensorMap:
     """An edit stack as a function of tensors.
 
     On a GPU the kernel reads and writes the tensors where they are. On the CPU it sees them as arrays of the
-    same memory, which it takes faster; `as_tensors` hands it tensors there too. `is_reference`: by the float64
-    reference, see the module.
+    same memory, which it takes faster; `as_tensors` hands it tensors there too.
+    `is_reference`: by the float64 reference, see the module.
     """
 
     def __init__(

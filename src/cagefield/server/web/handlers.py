@@ -14,6 +14,7 @@ from cagefield.geometry.cage import Cage
 from cagefield.server.editor.cage_placement import fit_to_content
 from cagefield.server.editor.edit_texts import read_edits
 from cagefield.server.editor.pasting import build_paste
+from cagefield.server.editor.point_edits import decoded_mesh_cage
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import (
     client_messages,
@@ -250,6 +251,14 @@ class MessageHandlers:
     async def _place_point(self, message: point_messages.PlacePoint) -> None:
         point, height = await self._seen(message.x, message.y)
         self._session.place_point(point, height)
+        self._coordinator.changed()
+
+    @_handles(point_messages.PlaceMesh)
+    async def _place_mesh(self, message: point_messages.PlaceMesh) -> None:
+        cage, warning = await run_in_thread(lambda: decoded_mesh_cage(message.name, message.content))
+        self._session.place_mesh(cage, message.name)
+        if warning is not None:
+            self._page.notice("warning", warning)
         self._coordinator.changed()
 
     @_handles(point_messages.Subdivide)

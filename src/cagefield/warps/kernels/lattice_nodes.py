@@ -143,9 +143,9 @@ def _flow_batch(grid, nodes, steps, frames, iterations, resolution, out, first):
 def flow_nodes_back(grid, nodes, steps, frames, iterations, resolution, out):
     """Writes Phi^-1(x) - x [R^3,3] of nodes x of a box.
 
-    grid [K N^3 4] float32, nodes N, steps [K]: velocities (x fastest, padded to 4) and steps of the flow, each
-    of them in so many iterations; frames [11,3]: center, dz/dx, dx/dz of the outer cage, then origin and edges
-    of the nodes' box.
+    grid [K N^3 4] float32, nodes N, steps [K]: velocities (x fastest, padded to 4) and steps of the flow;
+    iterations of each step; frames [11,3]: center, dz/dx, dx/dz of the outer cage, then origin and edges of
+    the nodes' box.
     """
     count = resolution**3
     for part in prange((count + NODES_PER_BATCH - 1) // NODES_PER_BATCH):

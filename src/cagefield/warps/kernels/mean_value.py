@@ -1,8 +1,8 @@
 """Numba kernel of a mesh cage: blends of its vertices' motion by mean value coordinates, and its distance.
 
 Triangles near a point add the weights of `geometry.mean_value`, in the vector form of Floater, Kos and
-Reimers, "Mean value coordinates in 3D" (2005): a triangle seen in the unit vectors u_1, u_2, u_3 adds w_i / r_i
-with
+Reimers, "Mean value coordinates in 3D" (2005): a triangle seen in the unit vectors u_1, u_2, u_3 adds
+w_i / r_i with
 
     m = 1/2 sum_i theta_i n_i,    w_i = m . (u_(i+1) x u_(i-1)) / (u_1 . (u_2 x u_3)),
 
@@ -160,7 +160,7 @@ def _far(y, table, squares, sums):
 
 @njit(**FAST)
 def _block(x, y, corners, motion, table, squares, sums, totals, away, part, some, lanes):
-    """Sums over all triangles, totals [8,L], and squared distances, away [L], of points x [3,L], y of them."""
+    """Sums over all triangles, totals [8,L], and squared distances, away [L], of points x and y [3,L]."""
     for n in range(8):
         for l in range(MESH_LANES):
             sums[n, l] = np.float32(0.0)
@@ -208,8 +208,8 @@ def _block(x, y, corners, motion, table, squares, sums, totals, away, part, some
 def blend_motion(places, center, corners, motion, table, out):
     """Writes out [N,4]: the motion blended at places [N,3], and their distance from the mesh, 0 inside.
 
-    corners [F,3,3] of the triangles and their motion [F,3,3]; table [F,11] float32: centroids less center [3],
-    areas times outward normals, motion of the centroids, (`FAR` radius)^2, radius, the largest distance of a
+    corners [F,3,3] of the triangles, their motion [F,3,3]; table [F,11] float32: centroids less center [3],
+    areas times outward normals, motion of the centroids, (`FAR` radius)^2, radius: the largest distance of a
     corner from the centroid.
 
     Inside, the blend is that of the mean value coordinates; outside, of the sizes of their triangles' parts,
@@ -234,6 +234,26 @@ def blend_motion(places, center, corners, motion, table, out):
             for n in range(3):
                 out[first + l, n] = totals[outside + 1 + n, l] / totals[outside, l]
             out[first + l, 3] = np.sqrt(away[l]) if outside else 0.0
+
+
+@njit(**FAST)
+def relax(values, odd, even, share, nodes, sweeps):
+    """Solves Laplace's equation for values [G^3,3] at the nodes odd and even, in place; the others stay.
+
+    Red-black successive over-relaxation on a grid of G = `nodes` an axis; share [3]: weights of a neighbor
+    along x, y and z, (1/h^2) over twice their sum.
+    """
+    line, plane = nodes, nodes * nodes
+    over = 2.0 / (1.0 + np.sin(np.pi / max(nodes // 2, 3)))
+    for _ in range(sweeps):
+        for half in (odd, even):
+            for m in range(len(half)):
+                n = half[m]
+                for c in range(3):
+                    mean = share[0] * (values[n - 1, c] + values[n + 1, c])
+                    mean += share[1] * (values[n - line, c] + values[n + line, c])
+                    mean += share[2] * (values[n - plane, c] + values[n + plane, c])
+                    values[n, c] += over * (mean - values[n, c])
 
 
 @njit(**FAST)
