@@ -36,7 +36,7 @@ FREE_FORM_EDITS = """edits:
     inner: {points: [[0, 0, 0.3], [0.3, 0, 0]], radius: 0.4}
     operations: [{move_point: {point: 0, by: [0, 0, 0.1]}}]
   - name: mesh
-    inner: {mesh: {file: cube.obj, interior: harmonic}}
+    inner: {mesh: {file: cube.obj}}
     outer: {margin: 0.4}
     operations: [{move_point: {point: 7, by: [0.05, 0, 0]}}]
 """

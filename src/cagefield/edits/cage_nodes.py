@@ -16,7 +16,7 @@ from cagefield.geometry.bspline_lattice import INTERPOLATIONS
 from cagefield.geometry.cage import Cage, LatticeCage
 from cagefield.geometry.cage_checks import MOST_POINTS
 from cagefield.geometry.control_points import ControlPoints
-from cagefield.geometry.mesh_cage import INTERIORS, MeshCage
+from cagefield.geometry.mesh_cage import MeshCage
 from cagefield.geometry.mesh_files import read_mesh_cage
 from cagefield.geometry.point_deformers import FALLOFF_CURVES
 from cagefield.geometry.triangle_mesh import MAX_MESH_VERTICES
@@ -52,12 +52,11 @@ def _lattice(node: Node) -> LatticeCage:
 
 def _mesh(node: Node, folder: Path | None) -> MeshCage:
     keys = node.mapping(required=("mesh",), optional=("pivot", "linear"))
-    mesh = keys["mesh"].mapping(optional=("file", "vertices", "triangles", "interior"))
+    mesh = keys["mesh"].mapping(optional=("file", "vertices", "triangles"))
     if ("file" in mesh) == ("vertices" in mesh) or ("vertices" in mesh) != ("triangles" in mesh):
         raise keys["mesh"].error("a mesh has either file, or vertices and triangles")
     pivot = keys["pivot"].vector() if "pivot" in keys else None
     linear = [row.vector() for row in keys["linear"].items(3)] if "linear" in keys else None
-    interior = mesh["interior"].choice(INTERIORS) if "interior" in mesh else "mean_value"
     try:
         if "file" in mesh:
             name = mesh["file"].text()
@@ -72,7 +71,7 @@ def _mesh(node: Node, folder: Path | None) -> MeshCage:
                 [number.integer(0, MAX_MESH_VERTICES - 1) for number in triangle.items(3)]
                 for triangle in mesh["triangles"].items()
             ]
-        return MeshCage(vertices, triangles, pivot=pivot, linear=linear, interior=interior)
+        return MeshCage(vertices, triangles, pivot=pivot, linear=linear)
     except EditFileError:
         raise
     except CagefieldError as error:
@@ -143,8 +142,6 @@ def _from_mesh(cage: MeshCage) -> dict[str, Any]:
     content: dict[str, Any] = {
         "mesh": {"vertices": cage.vertices.tolist(), "triangles": cage.triangles.tolist()}
     }
-    if cage.interior != "mean_value":
-        content["mesh"]["interior"] = cage.interior
     if not np.array_equal(cage.vertices.mean(axis=0), cage.pivot):
         content["pivot"] = cage.pivot.tolist()
     if not np.array_equal(cage.linear, np.eye(3)):

@@ -17,12 +17,6 @@ from cagefield.geometry.lattice_points import finite, shares
 from cagefield.geometry.triangle_mesh import Triangles, check_crossings, closed_mesh, encloses, mesh_edges
 from cagefield.typing import Array, Mask
 
-INTERIORS: tuple[str, ...] = ("mean_value", "harmonic")
-"""Interiors of mesh cages: by mean value coordinates, smooth, some of which are negative inside of a concave
-mesh; or by the solution of Laplace's equation between its sides, on the grid of the flow: always a mean of
-the vertices' motion, which goes around a gap and not through it.
-"""
-
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class MeshCage(Cage):
@@ -32,7 +26,6 @@ class MeshCage(Cage):
     - vertices: [V,3] world units, V up to `MAX_MESH_VERTICES`.
     - triangles: [F,3] numbers of vertices, counter-clockwise seen from outside.
     - pivot: [3], about which `rotate`, `scale` and `shear` turn; the mean of the vertices if left out.
-    - interior: how the inside follows, "mean_value" (coordinates) or "harmonic" (see `INTERIORS`).
     - linear: [3,3] with a positive determinant, the linear map that these operations have made: its rotation
       gives the cage's own axes. The identity for new cages.
 
@@ -47,7 +40,6 @@ class MeshCage(Cage):
     triangles: Triangles
     linear: Array
     way: tuple[Array, ...]
-    interior: str
 
     is_hexahedron: ClassVar[bool] = False
     handle_noun: ClassVar[str] = "vertex"
@@ -61,22 +53,18 @@ class MeshCage(Cage):
         pivot: ArrayLike | None = None,
         linear: ArrayLike | None = None,
         way: tuple[Array, ...] = (),
-        interior: str = "mean_value",
     ) -> None:
         v, t = closed_mesh(vertices, triangles)
         check_crossings(v, t)
         A = read_only(np.eye(3) if linear is None else linear, (3, 3), "linear map of a mesh cage")
         if not np.linalg.det(A) > 0.0:
             raise CageError("linear map of a mesh cage must have a positive determinant; leave it out")
-        if interior not in INTERIORS:
-            raise CageError(f'interior must be one of {", ".join(INTERIORS)}, got "{interior!s:.40}"')
         at = v.mean(axis=0) if pivot is None else pivot
         for name, value in (
             ("vertices", v),
             ("triangles", t),
             ("linear", A),
             ("way", way),
-            ("interior", interior),
             ("pivot", read_only(at, (3,), "pivot of a mesh cage")),
         ):
             object.__setattr__(self, name, value)
@@ -101,7 +89,7 @@ class MeshCage(Cage):
         return self.has_shape_of(other) and all(np.array_equal(a, b) for a, b in frames)
 
     def __hash__(self) -> int:
-        return hash((self.interior, self.vertices.tobytes(), self.triangles.tobytes(), self.pivot.tobytes()))
+        return hash((self.vertices.tobytes(), self.triangles.tobytes(), self.pivot.tobytes()))
 
     def __repr__(self) -> str:
         return f"MeshCage({self.vertices.tolist()}, {self.triangles.tolist()})"
@@ -125,7 +113,6 @@ class MeshCage(Cage):
         """True where another mesh has the same vertices and triangles."""
         return (
             isinstance(other, MeshCage)
-            and self.interior == other.interior
             and np.array_equal(self.vertices, other.vertices)
             and np.array_equal(self.triangles, other.triangles)
         )
@@ -153,7 +140,6 @@ class MeshCage(Cage):
             pivot=point_deformers.mirrored(self.pivot, axis, at),
             linear=F @ self.linear @ F,
             way=tuple(point_deformers.mirrored(state, axis, at) for state in self.way),
-            interior=self.interior,
         )
 
     def mirrored_handle(self, handle: int, axis: int) -> int:
@@ -215,7 +201,7 @@ class MeshCage(Cage):
     ) -> MeshCage:
         A = self.linear if linear is None else linear
         states = (*self.way, *way)[-MAX_WAY_STATES:]
-        return MeshCage(points, self.triangles, pivot=pivot, linear=A, way=states, interior=self.interior)
+        return MeshCage(points, self.triangles, pivot=pivot, linear=A, way=states)
 
     def _box(self) -> Array:
         y = (self.vertices - self.pivot) @ np.linalg.inv(self.linear).T

@@ -24,9 +24,6 @@ MIN_MESH_STEPS, MAX_MESH_STEPS = 4, 64
 ENOUGH_STRAIN = 0.9
 """h |dv/dz| of a step that is not made shorter; a step is proven one to one below 2."""
 
-RELAXATIONS = 60
-"""Sweeps of the harmonic interior, from the blend by mean value coordinates on."""
-
 SWEEPS = 16
 """Sweeps over the vertices that make the grid's velocity theirs, see `meet_points`."""
 
@@ -119,16 +116,11 @@ class MeshFlow:
     from a grid of nodes, one slice for each step, trilinear in z: so its slope has a bound, and a step of the
     implicit midpoint rule, which is its own inverse, is one to one where h |dv/dz| < 2 (see `LatticeFlow`).
 
-    With the interior "harmonic" the residuals' blend solves Laplace's equation at the nodes inside that have
-    all six neighbors inside, with the others' as its boundary values (after Joshi et al., "Harmonic
-    coordinates for character articulation", SIGGRAPH 2007, who solve for coordinates).
-
     Where the motion is affine it is so inside, to rounding: the grid holds an affine velocity exactly. Else
     the nodes next to a vertex are changed until its own velocity is interpolated there.
     """
 
     triangles: Triangles
-    interior: str
     pieces: tuple[MeshPiece, ...]
     outer: Cage
     falloff: Falloff
@@ -185,27 +177,6 @@ class MeshFlow:
             strain = 1.05 * max(slope_bound(part) for part in slices)
         return slices, strain / (1.05 * steps)
 
-    def _relax(self, rows: NDArray[np.intp], found: Array) -> None:
-        """Makes the blend of `found` [N,4] harmonic inside, in place; rows [N] number its nodes."""
-        from cagefield.warps.kernels.mean_value import relax
-
-        n = self.cells + 1
-        inside, values = np.zeros(n**3, dtype=bool), np.zeros((n**3, 3))
-        inside[rows], values[rows] = found[:, 3] == 0.0, found[:, :3]
-        grid = inside.reshape(n, n, n)
-        free = np.zeros_like(grid)
-        core = free[1:-1, 1:-1, 1:-1]
-        core[:] = grid[1:-1, 1:-1, 1:-1]
-        for axis in range(3):
-            for shift in (-1, 1):
-                core &= np.roll(grid, shift, axis=axis)[1:-1, 1:-1, 1:-1]
-        k, j, i = np.nonzero(free)
-        numbers, odd = (k * n + j) * n + i, (i + j + k) % 2 == 1
-        share = 1.0 / (self.confines.frame**2).sum(axis=0)
-        share *= 0.5 / share.sum()
-        relax(values, numbers[odd], numbers[~odd], share, n, RELAXATIONS)
-        found[:, :3] = values[rows]
-
     def _slice(self, piece: MeshPiece, s: float, h: float) -> Float32:
         """The velocity [G,G,G,3] of the step from s to s + h."""
         from cagefield.warps.kernels.mean_value import meet_points
@@ -213,8 +184,6 @@ class MeshFlow:
         places, rows, d_o = _nodes(self.outer, self.cells)
         B, b, vertices, residual = piece.chord(s, h)
         found = blend(places, vertices, self.triangles, residual)
-        if self.interior == "harmonic" and residual.any():
-            self._relax(rows, found)
         edges = self.confines.frame * (2.0 / self.cells)
         cell = max(np.linalg.norm(edges @ signs) for signs in ((1, 1, 1), (1, 1, -1), (1, -1, 1), (-1, 1, 1)))
         d_i = (found[:, 3] - np.minimum(cell, 0.5 * d_o)).clip(0.0)

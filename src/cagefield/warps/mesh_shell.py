@@ -50,9 +50,7 @@ class MeshShell:
         """The flow, on a grid that the gap between the cages asks for."""
         wanted = 2.0 * CELLS_PER_GAP / max(self._gap, 1e-6)
         cells = int(np.clip(np.ceil(wanted), MIN_CELLS, MAX_CELLS))
-        return MeshFlow(
-            self.inner.triangles, self.inner.interior, self._pieces, self.outer, self.falloff, cells
-        )
+        return MeshFlow(self.inner.triangles, self._pieces, self.outer, self.falloff, cells)
 
     @cached_property
     def _pieces(self) -> tuple[MeshPiece, ...]:

@@ -237,26 +237,6 @@ def blend_motion(places, center, corners, motion, table, out):
 
 
 @njit(**FAST)
-def relax(values, odd, even, share, nodes, sweeps):
-    """Solves Laplace's equation for values [G^3,3] at the nodes odd and even, in place; the others stay.
-
-    Red-black successive over-relaxation on a grid of G = `nodes` an axis; share [3]: weights of a neighbor
-    along x, y and z, (1/h^2) over twice their sum.
-    """
-    line, plane = nodes, nodes * nodes
-    over = 2.0 / (1.0 + np.sin(np.pi / max(nodes // 2, 3)))
-    for _ in range(sweeps):
-        for half in (odd, even):
-            for m in range(len(half)):
-                n = half[m]
-                for c in range(3):
-                    mean = share[0] * (values[n - 1, c] + values[n + 1, c])
-                    mean += share[1] * (values[n - line, c] + values[n + line, c])
-                    mean += share[2] * (values[n - plane, c] + values[n + plane, c])
-                    values[n, c] += over * (mean - values[n, c])
-
-
-@njit(**FAST)
 def meet_points(grid, z, wanted, sweeps):
     """Changes velocities [G,G,G,3] float32 so that those at points z [V,3] in [-1,1]^3 become wanted [V,3].
 
