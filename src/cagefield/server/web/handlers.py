@@ -14,7 +14,6 @@ from cagefield.geometry.cage import Cage
 from cagefield.server.editor.cage_placement import fit_to_content
 from cagefield.server.editor.edit_texts import read_edits
 from cagefield.server.editor.pasting import build_paste
-from cagefield.server.editor.point_edits import decoded_mesh_cage
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import (
     client_messages,
@@ -43,6 +42,7 @@ from cagefield.server.render_worker.tasks import (
     values_of,
 )
 from cagefield.server.render_worker.view import Display
+from cagefield.server.web.point_handlers import PointChange, change_points
 from cagefield.server.web.selection_handlers import change_selection, histogram_of
 from cagefield.server.web.worker_threads import run_in_thread
 from cagefield.typing import Array
@@ -254,21 +254,10 @@ class MessageHandlers:
         self._coordinator.changed()
 
     @_handles(point_messages.PlaceMesh)
-    async def _place_mesh(self, message: point_messages.PlaceMesh) -> None:
-        cage, warning = await run_in_thread(lambda: decoded_mesh_cage(message.name, message.content))
-        self._session.place_mesh(cage, message.name)
-        if warning is not None:
-            self._page.notice("warning", warning)
-        self._coordinator.changed()
-
     @_handles(point_messages.Subdivide)
-    def _subdivide(self, message: point_messages.Subdivide) -> None:
-        self._session.subdivide(message.edit, message.cells, message.interpolation)
-        self._coordinator.changed()
-
     @_handles(point_messages.PointReach)
-    def _point_reach(self, message: point_messages.PointReach) -> None:
-        self._session.point_reach(message.edit, message.radius, message.falloff)
+    async def _change_points(self, message: PointChange) -> None:
+        await change_points(self._session, self._page, message)
         self._coordinator.changed()
 
     async def _seen(self, x: float | None, y: float | None) -> tuple[Array, float]:
