@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera
 from cagefield.edits import MovePoint, MovePoints, load_edits
-from cagefield.geometry.cage import LatticeCage
+from cagefield.geometry.cage import Cage, LatticeCage
+from cagefield.geometry.mesh_cage import MeshCage
 from cagefield.scene.scene import Scene
 from editor_page import EditorPage, editor_page
 from editor_server import EditorServer, editor_server
@@ -129,6 +130,37 @@ def test_a_control_point_is_dragged_with_a_radius(editor: EditorPage, scene: Pat
     assert np.allclose(moves(editor), 0.0)
     editor.press("o")
     editor.until("!cagefield.now.proportional")
+
+
+def test_a_mesh_file_becomes_a_cage_whose_edges_are_dragged(editor: EditorPage, scene: Path) -> None:
+    pytest.importorskip("trimesh", reason="trimesh is not installed")
+    mesh = MeshCage.of_box(Cage.box((0, 0, 0), 0.7))
+    obj = "".join(f"v {x} {y} {z}\n" for x, y, z in mesh.vertices)
+    obj += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in mesh.triangles)
+    file = scene.parent / "cube.obj"
+    file.write_text(obj)
+    editor.changed(lambda: editor.page.set_input_files("input.mesh-file", file))
+    editor.tools(mode="edit", tool="select", axes="world")
+    assert editor.edit["cage"] == "mesh" and editor.edit["name"] == "cube"
+    edges = editor.edit["points"]["edges"]
+    assert len(edges) == 18
+    empty = editor.pixels()
+    drawn = np.abs(editor.pixels(cages=True) - empty).max(axis=2) > 0.1
+    # A line of the net, away from vertices, is drawn: the middle of the diagonal of a face to the camera.
+    points = np.array(editor.edit["points"]["deformed"])
+    pairs = [(i, j) for i, j in edges if np.allclose(points[[i, j], 1], -0.35)]
+    i, j = next(pair for pair in pairs if np.linalg.norm(np.subtract(*points[list(pair)])) > 0.9)
+    middle = editor.page.evaluate(f"cagefield.project({(0.6 * points[i] + 0.4 * points[j]).tolist()})")
+    x, y = round(middle["x"] - editor.box["x"]), round(middle["y"] - editor.box["y"])
+    assert drawn[y - 3 : y + 4, x - 3 : x + 4].any()
+    editor.drag((middle["x"], middle["y"]), (8, 6))
+    by = moves(editor)
+    assert np.linalg.norm(by[i]) > 0.01 and np.allclose(by[i], by[j])
+    assert np.allclose(np.delete(by, (i, j), axis=0), 0.0)
+    bad = scene.parent / "open.obj"
+    bad.write_text("".join(line for line in obj.splitlines(True)[:-1]))
+    editor.page.set_input_files("input.mesh-file", bad)
+    assert "open.obj: mesh is open" in editor.said("mesh is open")
 
 
 def test_the_help_lists_the_keys(editor: EditorPage) -> None:

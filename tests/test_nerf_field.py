@@ -14,6 +14,7 @@ from cagefield.errors import FieldError
 from cagefield.fields.mlp import Linear, Mlp
 from cagefield.fields.nerf_field import NerfField
 from cagefield.fields.protocol import Field
+from cagefield.geometry import MeshCage
 from cagefield.geometry.cage import Cage
 from nerf_networks import affine, gamma, hidden_of, relu, small_field, small_mlp
 
@@ -290,6 +291,53 @@ def test_tensors_go_through_edits_as_the_reference_takes_them(name) -> None:
     np.testing.assert_allclose(q.numpy()[kept], expected.points[kept], atol=3e-4)
     np.testing.assert_allclose(v.numpy()[kept], expected.viewdirs[kept], atol=2e-3)
     np.testing.assert_allclose(np.linalg.norm(v.numpy(), axis=1), 1.0, atol=1e-5)
+
+
+FREE_FORM = {
+    "lattice": Edit.continuous(Cage.box((0, 0, 0), 0.8).subdivided((2, 2, 2)), Cage.box((0, 0, 0), 1.8))
+    .twist("z", 0.4)
+    .move_point(13, (0.05, 0.0, 0.02)),
+    "points": Edit.points([(0.2, 0, 0), (-0.2, 0.1, 0)], radius=0.5).move_point(0, (0.1, 0.05, 0)),
+    "mesh": Edit.continuous(MeshCage.of_box(Cage.box((0, 0, 0), 0.8)), Cage.box((0, 0, 0), 1.8)).move_point(
+        7, (0.15, 0.1, 0.2)
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FREE_FORM)
+def test_free_form_edits_of_tensors_are_exact(name) -> None:
+    """The samples of a lattice, control points and a mesh: by the map itself, not by nodes."""
+    edit = FREE_FORM[name]
+    canonical = np.random.default_rng(3).uniform(-0.6, 0.6, (500, 3))
+    forward = EditStack([edit]).to_deformed(canonical)
+    p = forward.points.astype(np.float32)
+    d = directions(500)
+    mapped = TensorMap(EditStack([edit]), torch.device("cpu"))
+    q, v, gain = mapped(torch.from_numpy(p), torch.from_numpy(d))
+    np.testing.assert_allclose(q.numpy(), canonical, atol=2e-6)  # float32 of p, stretched
+    along = np.linalg.solve(forward.jacobian, d[:, :, None])[..., 0]
+    length = np.linalg.norm(along, axis=1)
+    off = np.abs(v.numpy() - along / length[:, None]).max(axis=1)  # kinks between cells of the velocity
+    assert np.quantile(off, 0.98) < 1e-4 and np.isclose(np.median(gain.numpy() / length), 1.0, rtol=1e-4)
+    nodes = TensorMap(EditStack([edit.replace(lattice=64)]), torch.device("cpu"))
+    assert not nodes.is_reference
+    by_nodes = nodes(torch.from_numpy(p), torch.from_numpy(d))[0].numpy()
+    assert np.abs(by_nodes - canonical).max() > 1e-4
+
+
+def test_a_mesh_cage_around_everything_moves_it_with_the_camera() -> None:
+    field = small_field(samples=(24, 32), bounded=True)
+    shift = np.array([0.4, -0.3, 0.2])
+    cage = MeshCage.of_box(Cage.box((0, 0, 0), 3.2))
+    edit = Edit.continuous(cage, Cage.box((0, 0, 0), 8.0)).translate(shift)
+    pose = np.eye(4)
+    pose[:3, 3] = shift
+    before = camera(6)
+    after = before.with_c2w(pose @ before.c2w)
+    one = NerfRenderer(field).render(before)
+    other = NerfRenderer(field, edits=EditStack([edit])).render(after)
+    np.testing.assert_allclose(other.rgb, one.rgb, atol=2e-3)
+    assert np.abs(NerfRenderer(field).render(after).rgb - one.rgb).max() > 0.05
 
 
 def test_kernels_take_tensors_themselves() -> None:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import base64
+
 import numpy as np
 import pytest
 
 from cagefield.edits import Bend, Edit, EditStack, MovePoint, Rotate, Translate, dump_edits, parse_edits
-from cagefield.errors import EditError
+from cagefield.errors import CagefieldError, EditError
+from cagefield.geometry import MeshCage
 from cagefield.geometry.cage import Cage
 from cagefield.geometry.reach_cage import ReachCage
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.drag_solver import appended
+from cagefield.server.editor.point_edits import decoded_mesh_cage
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol.conversion import edit_state
 
@@ -102,3 +106,39 @@ def test_moves_of_one_point_are_joined_and_bends_are_not() -> None:
     others = appended(moves, MovePoint(1, (0.0, 0.2, 0.0)))
     assert len(others) == 2
     assert len(appended((Bend("z", 10.0),), Bend("z", 5.0))) == 2
+
+
+def test_a_mesh_file_becomes_a_cage_with_its_edges() -> None:
+    pytest.importorskip("trimesh", reason="trimesh is not installed")
+    cube = MeshCage.of_box(Cage.box((0, 0, 0), 0.6))
+    obj = "".join(f"v {x} {y} {z}\n" for x, y, z in cube.vertices)
+    obj += "".join(f"f {a + 1} {c + 1} {b + 1}\n" for a, b, c in cube.triangles)  # inside out
+    cage, warning = decoded_mesh_cage("cube.obj", base64.b64encode(obj.encode()).decode())
+    assert warning is not None and "cube.obj: the mesh is inside out" in warning
+    s = session()
+    s.place_mesh(cage, "cube.obj")
+    entry = s.document.entries[0]
+    outer = entry.edit.shell_settings.outer
+    assert entry.edit.name == "cube" and outer is not None
+    np.testing.assert_allclose(outer.aabb, [3 * [-0.51], 3 * [0.51]])
+    points = edit_state(entry, None, None).points
+    assert points is not None and points.edges is not None and len(points.edges) == 18
+    sides = {tuple(sorted((t[k - 1], t[k]))) for t in cage.triangles.tolist() for k in range(3)}
+    assert set(points.edges) == sides
+    s.undo()
+    assert s.document.entries == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("cube.obj", "%%%", "cube.obj: the file arrived damaged; choose it again"),
+        ("cube.stl", "", r'cube.stl: a mesh cage is a .obj, .ply, .glb file, got ".stl"'),
+        ("cube.obj", base64.b64encode(b"v 0 0 0").decode(), "cube.obj: "),
+        ("cube.obj", base64.b64encode(bytes(5 << 20)).decode(), r"at most \d+ bytes; decimate"),
+    ],
+)
+def test_mesh_files_that_are_none_are_refused(name: str, content: str, said: str) -> None:
+    pytest.importorskip("trimesh", reason="trimesh is not installed")
+    with pytest.raises(CagefieldError, match=said):
+        decoded_mesh_cage(name, content)

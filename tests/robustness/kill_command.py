@@ -27,6 +27,21 @@ EDITS = """edits:
 """
 
 
+FREE_FORM_EDITS = """edits:
+  - name: lattice
+    inner: {center: [0, 0, 0], size: 0.8, lattice: {points: [3, 3, 3]}}
+    outer: {margin: 0.4}
+    operations: [{twist: {axis: z, degrees: 20}}]
+  - name: points
+    inner: {points: [[0, 0, 0.3], [0.3, 0, 0]], radius: 0.4}
+    operations: [{move_point: {point: 0, by: [0, 0, 0.1]}}]
+  - name: mesh
+    inner: {mesh: {file: cube.obj}}
+    outer: {margin: 0.4}
+    operations: [{move_point: {point: 7, by: [0.05, 0, 0]}}]
+"""
+
+
 @dataclass(frozen=True)
 class Command:
     """What is killed: `work` runs in a folder that `make` has filled; `check` says what is wrong afterwards.
@@ -54,6 +69,19 @@ def put_scene(folder: Path) -> None:
     ball_scene().save(folder / "scene")
     (folder / "scene" / "notes.txt").write_text("mine")
     (folder / "e.yaml").write_text(EDITS)
+
+
+def put_free_form(folder: Path) -> None:
+    """A scene, an edit file with a lattice, control points and a mesh, and the file of that mesh."""
+    from cagefield.geometry.cage import Cage
+    from cagefield.geometry.mesh_cage import MeshCage
+
+    put_scene(folder)
+    cube = MeshCage.of_box(Cage.box((0, 0, 0), 0.6))
+    lines = [f"v {x} {y} {z}" for x, y, z in cube.vertices.tolist()]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in cube.triangles.tolist()]
+    (folder / "cube.obj").write_text("\n".join(lines) + "\n")
+    (folder / "e.yaml").write_text(FREE_FORM_EDITS)
 
 
 def put_splats(folder: Path) -> None:

@@ -23,13 +23,16 @@ from kill_checks import (
     trained_problem,
     video_problem,
 )
-from kill_command import EDITS, Command, cli, put_scene, put_splats, renamed
+from kill_command import EDITS, Command, cli, put_free_form, put_scene, put_splats, renamed
 from kill_lines import LINES, SLOW_LINES
 from kill_points import Say
 
 from cagefield import Scene
 from cagefield.datasets import load_dataset
 from cagefield.datasets.sfm.transforms_writer import write_transforms
+from cagefield.edits import MovePoint
+from cagefield.geometry.mesh_cage import MeshCage
+from cagefield.geometry.mesh_files import read_mesh_cage
 from cagefield.images.image_files import write_png
 from cagefield.procedural import make_scene
 from cagefield.selection.element_selection import Selection
@@ -123,6 +126,59 @@ def _session_problem(folder: Path, said: int) -> str | None:
         return f"lost: {names[0]} carries nothing"
     if document.removed is None or f"n{document.removed.count}" != names[0]:
         return f"lost: the deleted elements of {names[0]}"
+    return None
+
+
+def _free_form_problem(folder: Path, said: int) -> str | None:
+    """What is wrong after an edit of free-form shapes, all of which the scene holds itself."""
+    problem = scene_problem(folder, 0)
+    if problem is not None or said < 1:
+        return problem
+    edits = list(Scene.open(folder / "scene").edits)
+    if [edit.name for edit in edits] != ["lattice", "points", "mesh"]:
+        return f"lost: the edits, {[edit.name for edit in edits]} are there"
+    mesh = edits[2].inner
+    if not isinstance(mesh, MeshCage) or len(mesh.vertices) != 8:
+        return "lost: the mesh"
+    return None
+
+
+def _free_form_session(folder: Path, say: Say) -> None:
+    """An editor: moves one vertex more at step n, keeps it, and says 2 n; saves it last and says 1 more."""
+    scene = Scene.open(folder / "scene")
+    store = SceneStore(scene, folder / "scene")
+    store.lock()
+    session = Session(store.recovered() or store.document(), scene.field.bounds, scene.field.sample_spacing)
+    if not session.document.entries:
+        text = (folder / "e.yaml").read_text().replace("file: cube.obj", _mesh_text(folder))
+        session.load_edits(text, False)
+    mesh = session.document.entries[2]
+    before = len(mesh.edit.operations) - 1
+    for number in range(1, 4):
+        vertex = (before + number) % 7
+        session.apply(mesh.id, "field", MovePoint(vertex, (0.0, 0.0, 0.01)))
+        store.autosave(session)
+        say(2 * number)
+    store.save(session)
+    say(7)
+    store.close()
+
+
+def _mesh_text(folder: Path) -> str:
+    cage = read_mesh_cage(folder / "cube.obj")
+    return f"vertices: {cage.vertices.tolist()}, triangles: {cage.triangles.tolist()}"
+
+
+def _free_form_session_problem(folder: Path, said: int) -> str | None:
+    problem = scene_problem(folder, 0)
+    if problem is not None or said < 2:
+        return problem
+    scene = Scene.open(folder / "scene")
+    store = SceneStore(scene, folder / "scene")
+    entries = (store.recovered() or store.document()).entries
+    moves = len(entries[2].edit.operations) - 1 if len(entries) == 3 else -1
+    if moves < said // 2:
+        return f"lost: {said // 2} moves of vertices were kept, {moves} are there"
     return None
 
 
@@ -267,6 +323,8 @@ COMMANDS: dict[str, Command] = {
 """What writes without kernels: a process for each kill takes a tenth of a second."""
 
 SLOW_COMMANDS: dict[str, Command] = {
+    "edit, free-form": Command(put_free_form, _edit, _free_form_problem),
+    "changes and saves, free-form": Command(put_free_form, _free_form_session, _free_form_session_problem),
     "train": Command(_make_photos, _train, trained_problem),
     "render, pictures": Command(_make_pictures, _render, pictures_problem),
     "render .mp4": Command(put_scene, _render_video, video_problem),

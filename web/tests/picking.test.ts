@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { EDGES, FACE_NAMES } from "../src/editing/cage";
 import {
+  pickMeshEdge,
   distanceToCage,
   visibleFaceCenters,
   pickPart,
@@ -8,6 +9,8 @@ import {
   type Project,
 } from "../src/editing/picking";
 import { box } from "./cages";
+import { cageLines } from "../src/editing/point_cages";
+import { partCorners, type Posed } from "../src/editing/cage";
 
 /** Looks along -z from z = 10 without perspective: 100 pixels a unit, the origin at (500, 500). */
 const project: Project = ([x, y, z]) => ({ x: 500 + 100 * x, y: 500 - 100 * y, depth: 10 - z });
@@ -37,5 +40,50 @@ describe("picking", () => {
 
   it("measures how far the edges are", () => {
     expect(distanceToCage(620, 500, { corners: cage.corners, pivot: [0, 0, 0] }, project)).toBeCloseTo(20, 9);
+  });
+});
+
+describe("edges of a mesh", () => {
+  const tetrahedron: Posed = {
+    corners: box([0, 0, 0], [1, 1, 1]),
+    pivot: [0, 0, 0],
+    points: [
+      [0, 0, 2],
+      [100, 0, 2],
+      [0, 100, 2],
+      [0, 0, 1],
+    ],
+    shape: null,
+    edges: [
+      [0, 1],
+      [0, 2],
+      [0, 3],
+      [1, 2],
+      [1, 3],
+      [2, 3],
+    ],
+  };
+  const project = ([x, y, depth]: readonly number[]): { x: number; y: number; depth: number } => ({
+    x,
+    y,
+    depth,
+  });
+
+  it("are the lines of the cage", () => {
+    expect(cageLines(tetrahedron)).toHaveLength(6);
+    expect(cageLines(tetrahedron)[3]).toEqual([
+      [100, 0, 2],
+      [0, 100, 2],
+    ]);
+  });
+
+  it("are picked by their two vertices, the closest one first", () => {
+    const across = pickMeshEdge(52, 52, tetrahedron, project);
+    expect(across).toMatchObject({ kind: "edge", index: 3, ends: [1, 2] });
+    expect(partCorners(across!)).toEqual([1, 2]);
+    // Edges (0, 1) and (1, 3) lie on each other on the screen; the second is nearer.
+    expect(pickMeshEdge(50, 3, tetrahedron, project)).toMatchObject({ ends: [1, 3] });
+    expect(pickMeshEdge(40, 30, tetrahedron, project)).toBeNull();
+    expect(pickMeshEdge(50, 3, { ...tetrahedron, edges: null }, project)).toBeNull();
   });
 });

@@ -43,6 +43,7 @@ const ON_THEIR_OWN: PointsState = {
     [0.3, 0, 0],
   ],
   shape: null,
+  edges: null,
   interpolation: null,
   radius: 0.2,
   falloff: "smooth",

@@ -14,7 +14,7 @@ from cagefield.geometry import hexahedron, point_deformers
 from cagefield.geometry.cage import MAX_WAY_STATES, Axes, Cage
 from cagefield.geometry.cage_checks import read_only
 from cagefield.geometry.lattice_points import finite, shares
-from cagefield.geometry.triangle_mesh import Triangles, check_crossings, closed_mesh, encloses
+from cagefield.geometry.triangle_mesh import Triangles, check_crossings, closed_mesh, encloses, mesh_edges
 from cagefield.typing import Array, Mask
 
 
@@ -103,6 +103,11 @@ class MeshCage(Cage):
     def points(self) -> Array:
         """The vertices [V,3]."""
         return self.vertices
+
+    @property
+    def mesh_edges(self) -> Triangles:
+        """The edges [E,2] of the triangles, the lower number of a vertex first."""
+        return mesh_edges(self.triangles)
 
     def has_shape_of(self, other: Cage) -> bool:
         """True where another mesh has the same vertices and triangles."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import os
 import warnings
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
@@ -29,27 +29,46 @@ def read_mesh_cage(path: str | os.PathLike[str]) -> MeshCage:
     formats, files that cannot be read, meshes that are no `MeshCage`, and where trimesh is not installed.
     """
     file = Path(path)
-    if file.suffix.lower() not in CAGE_FILE_SUFFIXES:
-        raise CageError(
-            f'{file}: a mesh cage is a {", ".join(CAGE_FILE_SUFFIXES)} file, got "{file.suffix}"; convert it'
-        )
+    _check_suffix(file)
     try:
         content = read_bytes(file, MAX_MESH_BYTES)
     except OSError as error:
         raise CageError(f"{file}: cannot be read ({error.strerror or error})") from None
+    cage, warning = mesh_cage_of(content, file)
+    if warning is not None:
+        warnings.warn(warning, stacklevel=2)
+    return cage
+
+
+def mesh_cage_of(content: bytes, file: PurePath) -> tuple[MeshCage, str | None]:
+    """(mesh cage, warning or None) of a file's content; its name tells the format.
+
+    Raises as `read_mesh_cage`.
+    """
+    _check_suffix(file)
+    if len(content) > MAX_MESH_BYTES:
+        raise CageError(f"{file}: a mesh cage's file has at most {MAX_MESH_BYTES} bytes; decimate the mesh")
     vertices, triangles = _loaded(content, file)
+    warning = None
     try:
         if len(triangles):
             check_edges(triangles)
             if signed_volume(vertices, triangles) < 0.0:
                 triangles = triangles[:, ::-1]
-                warnings.warn(f"{file}: the mesh is inside out; its triangles are turned over", stacklevel=2)
-        return MeshCage(vertices, triangles)
+                warning = f"{file}: the mesh is inside out; its triangles are turned over"
+        return MeshCage(vertices, triangles), warning
     except CagefieldError as error:
         raise CageError(f"{file}: {error}") from None
 
 
-def _loaded(content: bytes, file: Path) -> tuple[Array, Triangles]:
+def _check_suffix(file: PurePath) -> None:
+    if file.suffix.lower() not in CAGE_FILE_SUFFIXES:
+        raise CageError(
+            f'{file}: a mesh cage is a {", ".join(CAGE_FILE_SUFFIXES)} file, got "{file.suffix}"; convert it'
+        )
+
+
+def _loaded(content: bytes, file: PurePath) -> tuple[Array, Triangles]:
     """(vertices [V,3], triangles [F,3]) of a file's content."""
     try:
         import trimesh

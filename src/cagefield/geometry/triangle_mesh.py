@@ -93,9 +93,14 @@ def check_edges(t: Triangles) -> None:
         )
 
 
+def mesh_edges(t: Triangles) -> Triangles:
+    """The edges [E,2] of triangles [F,3], the lower number of a vertex first."""
+    return np.unique(np.sort(t[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+
+
 def check_crossings(v: Array, t: Triangles) -> None:
     """Raise `CageError` where an edge of the mesh goes through a triangle that it has no vertex with."""
-    edges = np.unique(np.sort(t[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    edges = mesh_edges(t)
     ends, faces = v[edges], v[t]
     low_e, high_e, low_f, high_f = ends.min(1), ends.max(1), faces.min(1), faces.max(1)
     meet = np.ones((len(edges), len(t)), dtype=bool)

@@ -12,6 +12,7 @@ from cagefield.geometry.cage import Cage, LatticeCage
 from cagefield.typing import Array, Float32, Mask
 from cagefield.warps.cage_maps import flow_between, inner_map_between
 from cagefield.warps.falloff import Falloff
+from cagefield.warps.flow_nodes import flow_nodes
 from cagefield.warps.interfaces import InnerMap, NoInnerMap
 from cagefield.warps.lattice_flow import LatticeFlow, outer_distance, outer_distance_gradient
 from cagefield.warps.lattice_way import Piece, pieces_between
@@ -103,22 +104,16 @@ class LatticeShell:
         """Displacements to canonical space [R^3,3], x fastest, of the nodes of a `Lattice`."""
         if not self.outer.is_affine:
             return self._sampled_exactly(resolution)
-        from cagefield.warps.kernels.lattice_nodes import sample_nodes
+        from cagefield.warps.kernels.lattice_nodes import ITERATIONS, sample_nodes
 
         around, flow = self.around, self.around.flow
         A, b = self.inner.affine
-        out = np.empty((resolution**3, 3), dtype=np.float32)
-        origin, frame = self.outer.frame
-        padded = np.zeros((*flow.velocities.shape[:-1], 4), dtype=np.float32)
-        padded[..., :3] = flow.velocities
-        confines, heights = flow.confines, flow.confines.heights
-        outer = (confines.center[None], confines.inverse, confines.frame, heights[None])
-        frames = np.concatenate([*outer, b[None], np.linalg.inv(A), A, origin[None], frame])
+        confines, (origin, frame) = flow.confines, self.outer.frame
+        outer = np.concatenate([confines.center[None], confines.inverse, confines.frame])
+        out = flow_nodes(flow.velocities, flow.steps, self.outer, outer, ITERATIONS, resolution)
+        inner = (confines.heights[None], b[None], np.linalg.inv(A), A, origin[None], frame)
         sample_nodes(
-            padded.reshape(-1),
-            np.uintp(flow.cells + 1),
-            flow.steps,
-            frames,
+            np.concatenate([outer, *inner]),
             around.padded,
             self.deformed.interpolation == "linear",
             around.face_table,

@@ -67,9 +67,8 @@ class Piece:
 
     def frame(self, s: float) -> tuple[Array, Array, Array, Array]:
         """(c [3], F [3,3], dc/ds [3], dF/ds [3,3]) at time s."""
-        a, b, M = self._fit
-        U, sigma, Vt = np.linalg.svd(M)
-        turn = Rotation.from_matrix(U @ Vt).as_rotvec()
+        a, b, _ = self._fit
+        turn, sigma, Vt = self._polar
         x, y, z = turn
         omega = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
         R = Rotation.from_rotvec(s * turn).as_matrix()
@@ -77,11 +76,26 @@ class Piece:
         dF = omega @ F + R @ (Vt.T * (np.log(sigma) * sigma**s)) @ Vt
         return a + s * (b - a), F, b - a, dF
 
+    @cached_property
+    def _polar(self) -> tuple[Array, Array, Array]:
+        """(rotation vector [3] of R, singular values [3] of M, their axes in rows [3,3])."""
+        U, sigma, Vt = np.linalg.svd(self._fit[2])
+        return Rotation.from_matrix(U @ Vt).as_rotvec(), sigma, Vt
+
+    @cached_property
+    def _evaluated(self) -> dict[bytes, tuple[Array, Array]]:
+        """Values [M,6] and slopes [M,6,3] of (y_A, y_B - y_A), by the bytes of u."""
+        return {}
+
     def samples(self, s: float, u: Array) -> tuple[Array, Array, Array, Array]:
         """(y [M,3], dy/du [M,3,3], y_B - y_A [M,3], its derivative in u [M,3,3]) at u [M,3] and time s."""
-        y_a, y_b = self.local
-        both = np.concatenate([y_a, y_b - y_a], axis=1)
-        value, slope = bspline_lattice.evaluate(both, self.shape, self.interpolation, u)
+        known = self._evaluated.get(u.tobytes())
+        if known is None:
+            y_a, y_b = self.local
+            both = np.concatenate([y_a, y_b - y_a], axis=1)
+            known = bspline_lattice.evaluate(both, self.shape, self.interpolation, u)
+            self._evaluated[u.tobytes()] = known
+        value, slope = known
         y, d, dy, dd = value[:, :3], value[:, 3:], slope[:, :3], slope[:, 3:]
         return y + s * d, dy + s * dd, d, dd
 

@@ -19,7 +19,7 @@ from cagefield.warps.falloff import Falloff
 from cagefield.warps.lattice_flow import STEP_STRAIN, falloff_numbers, outer_distance, slope_bound
 from cagefield.warps.linear_motion import LinearMotion
 
-MIN_MESH_STEPS, MAX_MESH_STEPS = 6, 64
+MIN_MESH_STEPS, MAX_MESH_STEPS = 4, 64
 
 ENOUGH_STRAIN = 0.9
 """h |dv/dz| of a step that is not made shorter; a step is proven one to one below 2."""
@@ -28,44 +28,25 @@ SWEEPS = 16
 """Sweeps over the vertices that make the grid's velocity theirs, see `meet_points`."""
 
 
-@dataclass(frozen=True)
-class MeshTopology:
-    """Edges of a closed mesh: edges [E,2]; of each triangle the edges opposite to its vertices, sides [F,3],
-    and 1 or -1 where these go along with it or against it, signs [F,3]."""
+def blend(
+    places: Array, vertices: Array, triangles: Triangles, motion: Array, far: float | None = None
+) -> Array:
+    """[N,4]: the motion [V,3] of vertices [V,3] blended at places [N,3], their distance from the mesh.
 
-    triangles: Triangles
-    edges: NDArray[np.int64]
-    sides: NDArray[np.int64]
-    signs: Array
+    `far`: distance, in radii of a triangle, from which one value stands for it, see `kernels.mean_value`.
+    """
+    from cagefield.warps.kernels.mean_value import FAR, blend_motion
 
-    @classmethod
-    def from_triangles(cls, triangles: Triangles) -> MeshTopology:
-        """The edges of triangles [F,3]."""
-        directed = triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2)
-        edges, numbers = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True)
-        signs = np.where(directed[:, 0] < directed[:, 1], 1.0, -1.0)
-        return cls(triangles, edges, numbers.reshape(-1, 3), signs.reshape(-1, 3))
-
-    def blend(self, places: Array, vertices: Array, motion: Array) -> Array:
-        """[N,4]: the motion [V,3] of vertices [V,3] blended at places [N,3], their distance from the mesh."""
-        from cagefield.warps.kernels.mean_value import blend_motion
-
-        corners = vertices[self.triangles]
-        along = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)  # opposite to each vertex
-        normal = np.cross(along[:, 0], along[:, 1])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        inwards = np.cross(normal[:, None], along)
-        planes = np.concatenate([normal[:, None], inwards], axis=1)
-        on_planes = np.concatenate([corners[:, :1], np.roll(corners, -1, axis=1)], axis=1)
-        offsets = (planes * on_planes).sum(axis=2, keepdims=True)
-        walls = np.ascontiguousarray(np.concatenate([planes, offsets], axis=2).reshape(-1, 16))
-        out = np.empty((len(places), 4))
-        arrays = (np.ascontiguousarray(each) for each in (places, vertices))
-        blend_motion(
-            *arrays, self.edges, self.triangles, self.sides, self.signs, walls,
-            np.ascontiguousarray(motion), out,
-        )  # fmt: skip
-        return out
+    corners, moved, center = vertices[triangles], motion[triangles], vertices.mean(axis=0)
+    middle = corners.mean(axis=1)
+    normal = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    radius = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1, keepdims=True)
+    near = (radius * (FAR if far is None else far)) ** 2
+    columns = (middle - center, normal, moved.mean(axis=1), near, radius)
+    table = np.concatenate(columns, axis=1).astype(np.float32)
+    out = np.empty((len(places), 4))
+    blend_motion(np.ascontiguousarray(places), center, corners, moved, table, out)
+    return out
 
 
 @dataclass(frozen=True)
@@ -139,7 +120,7 @@ class MeshFlow:
     the nodes next to a vertex are changed until its own velocity is interpolated there.
     """
 
-    topology: MeshTopology
+    triangles: Triangles
     pieces: tuple[MeshPiece, ...]
     outer: Cage
     falloff: Falloff
@@ -187,9 +168,8 @@ class MeshFlow:
 
     def _slices(self, piece: MeshPiece) -> tuple[Float32, float]:
         """(velocities [K,G,G,G,3] of a piece, most h |dv/dz|), in as many steps as it takes."""
-        # One slice tells how many; where others are strained more, all are made again.
-        strain = 1.15 * slope_bound(self._slice(piece, 0.5 - 1e-3, 2e-3))
-        steps = 0
+        # As few steps as there may be tell how many it takes.
+        steps, strain = 0, 0.0
         while steps == 0 or (strain > steps * ENOUGH_STRAIN and steps < MAX_MESH_STEPS):
             steps = int(np.clip(np.ceil(strain / STEP_STRAIN), MIN_MESH_STEPS, MAX_MESH_STEPS))
             h = 1.0 / steps
@@ -203,7 +183,7 @@ class MeshFlow:
 
         places, rows, d_o = _nodes(self.outer, self.cells)
         B, b, vertices, residual = piece.chord(s, h)
-        found = self.topology.blend(places, vertices, residual)
+        found = blend(places, vertices, self.triangles, residual)
         edges = self.confines.frame * (2.0 / self.cells)
         cell = max(np.linalg.norm(edges @ signs) for signs in ((1, 1, 1), (1, 1, -1), (1, -1, 1), (-1, 1, 1)))
         d_i = (found[:, 3] - np.minimum(cell, 0.5 * d_o)).clip(0.0)

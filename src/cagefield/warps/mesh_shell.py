@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -12,8 +12,9 @@ from cagefield.geometry.mesh_cage import MeshCage
 from cagefield.typing import Array, Float32
 from cagefield.warps.cage_maps import flow_between, inner_map_between
 from cagefield.warps.falloff import Falloff
+from cagefield.warps.flow_nodes import flow_nodes
 from cagefield.warps.interfaces import InnerMap, NoInnerMap
-from cagefield.warps.mesh_flow import MeshFlow, MeshPiece, MeshTopology, pieces_of_mesh
+from cagefield.warps.mesh_flow import MeshFlow, MeshPiece, pieces_of_mesh
 
 MIN_GAP = 0.02
 """Least gap between the mesh and the outer cage on the way, as a share of the outer cage's half-width."""
@@ -49,8 +50,7 @@ class MeshShell:
         """The flow, on a grid that the gap between the cages asks for."""
         wanted = 2.0 * CELLS_PER_GAP / max(self._gap, 1e-6)
         cells = int(np.clip(np.ceil(wanted), MIN_CELLS, MAX_CELLS))
-        topology = _topology(self.inner.triangles.tobytes())
-        return MeshFlow(topology, self._pieces, self.outer, self.falloff, cells)
+        return MeshFlow(self.inner.triangles, self._pieces, self.outer, self.falloff, cells)
 
     @cached_property
     def _pieces(self) -> tuple[MeshPiece, ...]:
@@ -87,19 +87,14 @@ class MeshShell:
 
     def sample(self, resolution: int) -> Float32:
         """Displacements to canonical space [R^3,3], x fastest, of the nodes of a `Lattice`; in float32."""
-        from cagefield.warps.kernels.lattice_nodes import sample_flow_nodes
+        from cagefield.warps.kernels.lattice_nodes import MESH_ITERATIONS
 
-        out = np.zeros((resolution**3, 3), dtype=np.float32)
         if not self._pieces:
-            return out
+            return np.zeros((resolution**3, 3), dtype=np.float32)
         flow = self.flow
-        padded = np.zeros((*flow.velocities.shape[:-1], 4), dtype=np.float32)
-        padded[..., :3] = flow.velocities
         center, inverse, frame = self._confines
-        origin, edges = self.outer.frame
-        frames = np.concatenate([center[None], inverse, frame, origin[None], edges])
-        nodes = np.uintp(flow.cells + 1)
-        sample_flow_nodes(padded.reshape(-1), nodes, flow.steps, frames, resolution, out)
+        frames = np.concatenate([center[None], inverse, frame])
+        out = flow_nodes(flow.velocities, flow.steps, self.outer, frames, MESH_ITERATIONS, resolution)
         grid, ends = out.reshape(*3 * (resolution,), 3), [0, -1]
         grid[ends] = grid[:, ends] = grid[:, :, ends] = 0.0  # the outer faces, which the kernel rounds
         return out
@@ -126,11 +121,6 @@ class MeshShell:
         if self._pieces and not self.flow.is_one_to_one:
             return "is strained too much: the mesh moves too far for its gap to the outer cage"
         return None
-
-
-@lru_cache(maxsize=8)
-def _topology(triangles: bytes) -> MeshTopology:
-    return MeshTopology.from_triangles(np.frombuffer(triangles, dtype=np.int64).reshape(-1, 3))
 
 
 @flow_between.register

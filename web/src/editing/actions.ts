@@ -36,6 +36,9 @@ const MIN_BRUSH = 0.005;
 const MAX_BRUSH = 0.5;
 const BRUSH_STEP = 1.2;
 
+/** Bytes of a mesh file that fit into a message in base64. */
+const MAX_MESH_FILE = 750_000;
+
 export class Actions {
   private cameraIndex = -1;
 
@@ -286,7 +289,21 @@ export class Actions {
   /** Opens a file of splats in place of the scene; loads the edits of any other file. */
   async load(file: File): Promise<void> {
     if (isSplatFile(file.name)) await this.open(file);
+    else if (file.name.toLowerCase().endsWith(".obj")) await this.placeMesh(file);
     else this.app.send({ type: "load_edits", text: await file.text(), append: false });
+  }
+
+  /** A new edit with the mesh of a file as its inner cage, where the file has it. */
+  async placeMesh(file: File): Promise<void> {
+    if (file.size > MAX_MESH_FILE) {
+      this.app.say(`${file.name} is too large for a cage: decimate it to 512 vertices`, "error");
+      return;
+    }
+    const bytes = new Uint8Array(await file.arrayBuffer());
+    let text = "";
+    for (const byte of bytes) text += String.fromCharCode(byte);
+    this.app.expectEdit();
+    this.app.send({ type: "place_mesh", name: file.name, content: btoa(text) });
   }
 
   /** Saves the scene; asks for a folder first if the scene is an opened file. */

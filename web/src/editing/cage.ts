@@ -27,8 +27,10 @@ export const FACES: readonly (readonly number[])[] = FACE_NAMES.map((name) => {
 /** A part of a cage that can be dragged: a corner, an edge, a face, or a control point. */
 export interface CagePart {
   kind: "corner" | "edge" | "face" | "point";
-  /** Number of the corner or the control point, or index in `EDGES` or `FACES`. */
+  /** Number of the corner or the control point, or index in `EDGES`, `FACES` or the edges of a mesh. */
   index: number;
+  /** Vertices of an edge of a mesh. */
+  ends?: readonly [number, number];
 }
 
 /** A cage as it is drawn and moved. */
@@ -39,6 +41,8 @@ export interface Posed {
   points?: readonly Vec3[];
   /** Points of a lattice along x, y and z; null for points on their own. */
   shape?: [number, number, number] | null;
+  /** Edges of a mesh, each by its two points; null for others. */
+  edges?: readonly [number, number][] | null;
   /** Reach of points on their own. */
   radius?: number | null;
 }
@@ -46,6 +50,7 @@ export interface Posed {
 /** Numbers of the corners of a part; of a control point, its own. */
 export function partCorners(part: CagePart): number[] {
   if (part.kind === "corner" || part.kind === "point") return [part.index];
+  if (part.ends !== undefined) return [...part.ends];
   return [...(part.kind === "edge" ? EDGES : FACES)[part.index]];
 }
 

@@ -109,7 +109,7 @@ function addSelectedEdit(
     const stroke = edit.kind !== "continuous" ? IDLE : setting && editor.cage !== "inner" ? OUTER_SET : OUTER;
     addCage(out, cages.outer, tint.clone().lerp(WHITE, 0.35), stroke, dim);
   }
-  addCage(out, first, tint, edit.cage === "lattice" ? NET : INNER, dim);
+  addCage(out, first, tint, edit.cage === "lattice" || edit.cage === "mesh" ? NET : INNER, dim);
   if (dragObstacle(editor, edit) !== null) {
     if (hasOwnPoints(edit)) addPoints(out, first, tint);
     return;
@@ -117,6 +117,10 @@ function addSelectedEdit(
   for (const { cage: name, posed } of draggableCages(editor, cages)) {
     const hover = editor.hover?.cage === name ? editor.hover.part : null;
     if (hover && posed.points === undefined) addHighlight(out, posed.corners, hover);
+    if (hover?.ends && posed.points) {
+      const [i, j] = hover.ends;
+      addSegment(out, posed.points[i], posed.points[j], WHITE, HOVER);
+    }
     const main = name === "outer" ? editor.cage === "outer" : !setting || editor.cage !== "outer";
     addDots(out, posed, tint, hover, main ? editor.corners : [], main, eye);
   }

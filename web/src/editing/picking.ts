@@ -65,6 +65,18 @@ export function pickHandle(x: number, y: number, cage: Posed, project: Project):
   return pickCorner(x, y, handlesOf(cage), project, cage.points === undefined ? "corner" : "point");
 }
 
+/** The edge of a mesh at pixel (x, y), of several the one closest to the camera, or null. */
+export function pickMeshEdge(x: number, y: number, cage: Posed, project: Project): CagePart | null {
+  const { points, edges } = cage;
+  if (points === undefined || !edges) return null;
+  const places = points.map(project);
+  const found = closestPart(
+    "edge",
+    edges.map(([i, j]) => segmentDepthWithin(places[i], places[j], x, y)),
+  );
+  return found && { ...found, ends: edges[found.index] };
+}
+
 /** Centers [3] of the faces turned to the eye; null for the other faces. */
 export function visibleFaceCenters(corners: Corners, eye: Vec3): (Vec3 | null)[] {
   return FACES.map((ids, face) => {

@@ -34,12 +34,13 @@ export function posedCage(
   state: PointsState | null,
 ): Posed {
   if (state === null) return { corners, pivot };
-  return { corners, pivot, points, shape: state.shape, radius: state.radius };
+  return { corners, pivot, points, shape: state.shape, edges: state.edges, radius: state.radius };
 }
 
-/** Lines of a cage: edges of a box, lines between neighboring points of a lattice; none of other points. */
+/** Lines of a cage: edges of a box or a mesh, lines between neighboring points of a lattice; none of others. */
 export function cageLines(cage: Posed): [Vec3, Vec3][] {
-  const { corners, points, shape } = cage;
+  const { corners, points, shape, edges } = cage;
+  if (points !== undefined && edges) return edges.map(([i, j]) => [points[i], points[j]]);
   if (points === undefined) return EDGES.map(([i, j]) => [corners[i], corners[j]]);
   if (shape === undefined || shape === null) return [];
   const [nx, ny, nz] = shape;

@@ -6,7 +6,7 @@ import { operationAtRest } from "./carrier";
 import { targetCage } from "./drag";
 import { asPointMove, moveCornersBy, closestPointOnLine, intersectPlane } from "./gestures";
 import { snapLength, snapOperation, type Operation } from "./operations";
-import { distanceToCage, pickHandle, pickNetLine, pickPart } from "./picking";
+import { distanceToCage, pickHandle, pickMeshEdge, pickNetLine, pickPart } from "./picking";
 import { middleOf, planeOf, rowOf, steppedRadius, type NetLine, type Proportional } from "./point_cages";
 import { draggableCages, shownCages } from "./cage_overlay";
 import { dragObstacle, selectedEdit, showsCages, dragTarget, type Hover } from "../app/store";
@@ -216,8 +216,10 @@ export class Pointer {
     if (axis !== null && axis !== FREE_ROTATION) return null;
     const eye = this.app.viewport.camera.position.toArray();
     for (const { cage, posed } of cages) {
-      if (posed.points !== undefined) continue;
-      const part = pickPart(x, y, { corners: posed.corners, eye }, project);
+      const part =
+        posed.points === undefined
+          ? pickPart(x, y, { corners: posed.corners, eye }, project)
+          : pickMeshEdge(x, y, posed, project);
       if (part === null) continue;
       this.app.gizmo.clearHover();
       return { part, cage };

@@ -51,7 +51,8 @@ export type PageMessage =
   | RemoveElements
   | PlacePoint
   | Subdivide
-  | PointReach;
+  | PointReach
+  | PlaceMesh;
 export type ServerMessage = Hello | State | Dragged | Answer | Notice | Preview | Preparing | Job;
 
 /**
@@ -397,6 +398,14 @@ export interface Place {
   y?: number | null;
 }
 /**
+ * A new edit with a mesh cage, from a file's name and its content in base64, world units.
+ */
+export interface PlaceMesh {
+  type: "place_mesh";
+  name: string;
+  content: string;
+}
+/**
  * A new edit of one control point, on the surface seen at a pixel (x, y in [0,1] of the picture).
  *
  * Without a pixel it goes to the middle of the visible surface.
@@ -655,6 +664,7 @@ export interface PointsState {
   canonical: Vec3[];
   deformed: Vec3[];
   shape: [number, number, number] | null;
+  edges: [number, number][] | null;
   interpolation: ("linear" | "bspline") | null;
   radius: number | null;
   falloff: ("smooth" | "sphere" | "root" | "sharp" | "linear") | null;

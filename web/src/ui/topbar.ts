@@ -8,6 +8,7 @@ import {
   FolderOpen,
   Grid3x3,
   PanelRight,
+  Pyramid,
   Redo2,
   Save,
   SaveAll,
@@ -53,7 +54,7 @@ export function topbar(
   const grid = iconButton(Grid3x3, "Deformed lattice (L)", () => actions.toggle("grid"), "grid");
   const file = h("input", {
     type: "file",
-    accept: [".yaml", ".yml", ".json", ...SPLAT_SUFFIXES].join(),
+    accept: [".yaml", ".yml", ".json", ".obj", ...SPLAT_SUFFIXES].join(),
     hidden: true,
   });
   file.onchange = () => {
@@ -61,6 +62,13 @@ export function topbar(
     if (chosen) void actions.load(chosen);
     file.value = "";
   };
+  const mesh = h("input", { type: "file", accept: ".obj,.ply,.glb", hidden: true, class: "mesh-file" });
+  mesh.onchange = () => {
+    const chosen = mesh.files?.[0];
+    if (chosen) void actions.placeMesh(chosen);
+    mesh.value = "";
+  };
+  const addMesh = iconButton(Pyramid, "A mesh file as a cage…", () => mesh.click(), "mesh-cage");
   const save = iconButton(Save, "Save (Ctrl+S)", () => actions.save(), "save");
   const saveAs = iconButton(SaveAll, "Save as… (Ctrl+Shift+S)", () => dialogs.saveAs(), "save-as");
   const load = iconButton(FolderOpen, "Load an edit file, or open splats…", () => file.click(), "load");
@@ -71,7 +79,7 @@ export function topbar(
     unsaved.classList.toggle("shown", now.state?.saved === false);
     save.classList.toggle("due", now.state?.saved === false);
     const isLooking = isReadOnly(now);
-    for (const button of [save, saveAs, load]) button.hidden = isLooking;
+    for (const button of [save, saveAs, load, addMesh]) button.hidden = isLooking;
     undo.disabled = isLooking || (now.state?.entry ?? 0) <= 0;
     redo.disabled = isLooking || now.state === null || now.state.entry >= now.state.history.length - 1;
     for (const button of views) button.classList.toggle("on", button.dataset.view === now.view);
@@ -107,6 +115,7 @@ export function topbar(
       save,
       saveAs,
       load,
+      addMesh,
       iconLink(Download, "Download the edit file", `edits.yaml${location.search}`, "edits.yaml"),
       splats,
       screenshot,
@@ -118,5 +127,6 @@ export function topbar(
       panel,
     ),
     file,
+    mesh,
   );
 }

@@ -1,4 +1,8 @@
-"""The map of an edit stack for tensors: the same kernel, on the device where the tensors are."""
+"""The map of an edit stack for tensors: the same kernel, on the device where the tensors are.
+
+Kernels have no exact map of lattices, control points and meshes: stacks with one of these without a
+`lattice` are evaluated by the float64 reference, sample by sample, on the CPU.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,7 @@ from numpy.typing import NDArray
 from cagefield.compute import devices
 from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.quadrants import take_tensors
-from cagefield.edits import EditMap
+from cagefield.edits import Continuous, Edit, EditMap
 from cagefield.edits.device.kernels.edit_maps import EditArgs
 from cagefield.edits.device_stack import DeviceStack
 from cagefield.rendering.nerf.kernels.torch_edit_map import map_tensors
@@ -25,6 +29,7 @@ class TensorMap:
 
     On a GPU the kernel reads and writes the tensors where they are. On the CPU it sees them as arrays of the
     same memory, which it takes faster; `as_tensors` hands it tensors there too.
+    `is_reference`: by the float64 reference, see the module.
     """
 
     def __init__(
@@ -35,12 +40,16 @@ class TensorMap:
         preserve_opacity: bool = True,
         as_tensors: bool = False,
     ) -> None:
-        packed = DeviceStack.from_stack(edits)
         self.device = device
         self.preserve_opacity = preserve_opacity
+        self.is_reference = any(_has_no_kernel(step.edit) for step in edits.steps)
+        self._stack = edits
+        self._layers = tuple(zip(edits.layers, edits.places, strict=True))
+        if self.is_reference:
+            return
+        packed = DeviceStack.from_stack(edits)
         self._as_arrays = device.type == "cpu" and not as_tensors
         self.count, self.flows = packed.n_edits, packed.has_flows
-        self._layers = tuple(zip(edits.layers, edits.places, strict=True))
         self._edits = EditArgs(self._argument(packed.params), self._argument(packed.lattice), packed.n_edits)
 
     def _argument(self, values: NDArray[np.float32]) -> Any:
@@ -77,6 +86,8 @@ class TensorMap:
 
     def _mapped(self, points: Any, viewdirs: Any, preserve_opacity: bool) -> tuple[Any, Any, Any, Any]:
         """Results of the call, and x offsets [N] of the layers that samples read (`fields.voxel_layers`)."""
+        if self.is_reference:
+            return self._by_reference(points, viewdirs, preserve_opacity)
         devices.start()
         samples = torch.cat([points, viewdirs], dim=1).contiguous()
         out = torch.empty((len(samples), 8), dtype=torch.float32, device=self.device)
@@ -86,3 +97,21 @@ class TensorMap:
                 table, block_cyclic_schedule(len(samples)), result, self._edits, self.flows, preserve_opacity
             )
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7]
+
+    def _by_reference(self, points: Any, viewdirs: Any, preserve_opacity: bool) -> tuple[Any, Any, Any, Any]:
+        """Results of `_mapped`, by the float64 reference."""
+        p, d = (values.detach().cpu().numpy().astype(np.float64) for values in (points, viewdirs))
+        mapped = self._stack.to_canonical(p, d)
+        assert mapped.viewdirs is not None and mapped.stretch is not None
+        gain = np.where(mapped.emptied, 0.0, mapped.stretch if preserve_opacity else 1.0)
+        places = mapped.layer.astype(np.float32)
+        for number, (_, place) in enumerate(self._layers, start=1):
+            places[mapped.layer == number] = place
+        columns = (mapped.points, mapped.viewdirs, gain, places)
+        found = [torch.from_numpy(values.astype(np.float32)).to(self.device) for values in columns]
+        return found[0], found[1], found[2], found[3]
+
+
+def _has_no_kernel(edit: Edit) -> bool:
+    """True of an edit that is to be exact, while kernels take a lattice of nodes for it."""
+    return isinstance(edit, Continuous) and edit.lattice is None and edit.kernel_lattice is not None

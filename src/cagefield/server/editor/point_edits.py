@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+from pathlib import PurePath
+
 import numpy as np
 
 from cagefield.edits import Continuous, Edit
@@ -12,6 +15,7 @@ from cagefield.geometry.cage import Cage, LatticeCage
 from cagefield.geometry.cage_checks import point_numbers
 from cagefield.geometry.control_points import ControlPoints
 from cagefield.geometry.mesh_cage import MeshCage
+from cagefield.geometry.mesh_files import mesh_cage_of
 
 OF_CORNERS = (ops.MoveCorner, ops.MoveEdge, ops.MoveFace, ops.MoveCorners)
 """Operations that a cage without corners does not have."""
@@ -55,6 +59,28 @@ def edit_of_point(inner: Cage, *, name: str, lattice: int) -> Edit:
     """An edit of one control point, in the middle of a box that its reach fills."""
     radius = 0.5 * float(np.ptp(inner.corners, axis=0).max())
     return Edit.points([inner.center], radius=radius, name=name, lattice=lattice)
+
+
+OUTER_MARGIN = 0.35
+"""Margin of the outer cage of a mesh from a file, as a share of the mesh's largest extent."""
+
+
+def decoded_mesh_cage(name: str, content: str) -> tuple[MeshCage, str | None]:
+    """(mesh cage, warning or None) of a file's name and its content in base64.
+
+    Raises `CagefieldError` for content that is no base64 and as `mesh_cage_of`.
+    """
+    try:
+        data = base64.b64decode(content, validate=True)
+    except ValueError:
+        raise EditError(f"{name}: the file arrived damaged; choose it again") from None
+    return mesh_cage_of(data, PurePath(name))
+
+
+def edit_of_mesh(cage: MeshCage, *, name: str, lattice: int) -> Edit:
+    """An edit of a mesh cage in a box around it."""
+    margin = OUTER_MARGIN * float(np.ptp(cage.vertices, axis=0).max())
+    return Edit.continuous(cage, cage.grown(margin), name=name, lattice=lattice)
 
 
 def with_reach(edit: Edit, radius: float | None, falloff: str | None) -> Edit:

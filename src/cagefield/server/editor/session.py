@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import PurePath
 
 from cagefield.cameras.keyframes import Keyframe, Timeline
 from cagefield.edits import Continuous, Edit, Paste
@@ -18,6 +19,7 @@ from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
+from cagefield.geometry.mesh_cage import MeshCage
 from cagefield.selection.element_selection import Mode, Selection
 from cagefield.selection.selection_cages import outer_cage_of_shape
 from cagefield.server.editor.active_drags import Drags
@@ -34,7 +36,7 @@ from cagefield.server.editor.mirror import mirror_edit
 from cagefield.server.editor.pasting import crop_paste
 from cagefield.server.editor.path_edits import edits_at_time
 from cagefield.server.editor.path_preview import Preview
-from cagefield.server.editor.point_edits import edit_of_point, subdivided, with_reach
+from cagefield.server.editor.point_edits import edit_of_mesh, edit_of_point, subdivided, with_reach
 from cagefield.server.editor.validity import check_has_corners, problem
 from cagefield.typing import Array
 
@@ -232,6 +234,11 @@ class Session:
         inner, _ = cage_pair_around(point, view_height, self.bounds, self.voxel)
         edit = edit_of_point(inner, name=fresh_name(self.document, "points"), lattice=LATTICE)
         return self._add("Place control point", edit)
+
+    def place_mesh(self, cage: MeshCage, file: str) -> int:
+        """The number of a new continuous edit, selected, with a mesh cage read from a file."""
+        named = fresh_name(self.document, PurePath(file).stem[:100] or "mesh")
+        return self._add("Mesh cage from a file", edit_of_mesh(cage, name=named, lattice=LATTICE))
 
     def subdivide(self, number: int, cells: tuple[int, int, int], interpolation: str) -> None:
         """The inner cage as a lattice of `cells` along its axes."""

@@ -117,6 +117,7 @@ def points_state(edit: Edit) -> server_messages.PointsState | None:
         canonical=points_of(inner),
         deformed=points_of(edit.deformed),
         shape=None if lattice is None else lattice.shape,
+        edges=[(i, j) for i, j in inner.mesh_edges.tolist()] if isinstance(inner, MeshCage) else None,
         interpolation=None if lattice is None else cast(Any, lattice.interpolation),
         radius=None if on_their_own is None else on_their_own.radius,
         falloff=None if on_their_own is None else cast(Any, on_their_own.falloff),

@@ -6,7 +6,14 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
 
-from cagefield.server.protocol.common import CurveName, EditId, InterpolationName, Message, Reach
+from cagefield.server.protocol.common import (
+    MAX_MESSAGE_BYTES,
+    CurveName,
+    EditId,
+    InterpolationName,
+    Message,
+    Reach,
+)
 
 Cells: TypeAlias = Annotated[int, Field(ge=1, le=7)]
 
@@ -40,4 +47,12 @@ class PointReach(Message):
     falloff: CurveName | None = None
 
 
-PointMessage: TypeAlias = PlacePoint | Subdivide | PointReach
+class PlaceMesh(Message):
+    """A new edit with a mesh cage, from a file's name and its content in base64, world units."""
+
+    type: Literal["place_mesh"] = "place_mesh"
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    content: Annotated[str, Field(max_length=MAX_MESSAGE_BYTES)]
+
+
+PointMessage: TypeAlias = PlacePoint | Subdivide | PointReach | PlaceMesh

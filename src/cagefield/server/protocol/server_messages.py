@@ -57,7 +57,9 @@ class PointsState(Message):
     canonical: list[Vec3]
     deformed: list[Vec3]
     shape: tuple[int, int, int] | None
-    """Points of a lattice along x, y and z, numbered x fastest; None for points on their own."""
+    """Points of a lattice along x, y and z, numbered x fastest; None for others."""
+    edges: list[tuple[int, int]] | None
+    """Edges of a mesh, each by its two vertices; None for others."""
     interpolation: InterpolationName | None
     radius: float | None
     """Reach of points on their own, before scaling."""

@@ -42,6 +42,7 @@ from cagefield.server.render_worker.tasks import (
     values_of,
 )
 from cagefield.server.render_worker.view import Display
+from cagefield.server.web.point_handlers import PointChange, change_points
 from cagefield.server.web.selection_handlers import change_selection, histogram_of
 from cagefield.server.web.worker_threads import run_in_thread
 from cagefield.typing import Array
@@ -252,14 +253,11 @@ class MessageHandlers:
         self._session.place_point(point, height)
         self._coordinator.changed()
 
+    @_handles(point_messages.PlaceMesh)
     @_handles(point_messages.Subdivide)
-    def _subdivide(self, message: point_messages.Subdivide) -> None:
-        self._session.subdivide(message.edit, message.cells, message.interpolation)
-        self._coordinator.changed()
-
     @_handles(point_messages.PointReach)
-    def _point_reach(self, message: point_messages.PointReach) -> None:
-        self._session.point_reach(message.edit, message.radius, message.falloff)
+    async def _change_points(self, message: PointChange) -> None:
+        await change_points(self._session, self._page, message)
         self._coordinator.changed()
 
     async def _seen(self, x: float | None, y: float | None) -> tuple[Array, float]:
