@@ -15,7 +15,8 @@ import ngp_files as files
 from cagefield.cameras.camera import Camera
 from cagefield.errors import FieldError
 from cagefield.fields.external.external_file import load_external, save_external
-from cagefield.fields.external.instant_ngp import STEP, InstantNgpField
+from cagefield.fields.external.instant_ngp import InstantNgpField
+from cagefield.fields.external.instant_ngp_parameters import STEP
 from cagefield.files import msgpack
 from cagefield.formats.external.checkpoint import ExternalCheckpoint
 from cagefield.formats.external.read_external import read_external

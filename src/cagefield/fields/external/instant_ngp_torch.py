@@ -10,11 +10,11 @@ import torch
 from torch import Tensor
 
 from cagefield.fields.external.hash_grid_torch import TorchHashNetwork, TorchLayers, sh_values
-from cagefield.fields.external.instant_ngp import GRID_CELLS, NEAR, STEP
+from cagefield.fields.external.instant_ngp_parameters import GRID_CELLS, NEAR, STEP
 from cagefield.fields.external.torch_field import DensityAt, RaySamples, TorchField, box_crossing
 
 if TYPE_CHECKING:
-    from cagefield.fields.external.instant_ngp import InstantNgpField
+    from cagefield.fields.external.instant_ngp_parameters import InstantNgpParameters
 
 CONE = 1.0 / 256.0
 """Growth of the step with the distance, for cubes of an edge above 1."""
@@ -26,9 +26,9 @@ MAX_EXPONENT = 10.0
 
 
 class TorchInstantNgp(TorchField):
-    """Tensors of an `InstantNgpField`."""
+    """Tensors of an `InstantNgpParameters`."""
 
-    def __init__(self, field: InstantNgpField, device: torch.device | None = None) -> None:
+    def __init__(self, field: InstantNgpParameters, device: torch.device | None = None) -> None:
         super().__init__(field.bounds, device)
         self.field = field
         self._base = TorchHashNetwork(field.base, self.device)

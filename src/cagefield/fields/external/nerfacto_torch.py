@@ -11,7 +11,7 @@ from cagefield.fields.external.hash_grid_torch import TorchHashNetwork, TorchLay
 from cagefield.fields.external.torch_field import DensityAt, RaySamples, TorchField
 
 if TYPE_CHECKING:
-    from cagefield.fields.external.nerfacto import NerfactoField
+    from cagefield.fields.external.nerfacto_parameters import NerfactoParameters
 
 ENDLESS = 1e20
 """Length of the last sample's segment where it absorbs all that is left."""
@@ -21,9 +21,9 @@ HISTOGRAM_PADDING = 0.01
 
 
 class TorchNerfacto(TorchField):
-    """Tensors of a `NerfactoField`."""
+    """Tensors of a `NerfactoParameters`."""
 
-    def __init__(self, field: NerfactoField, device: torch.device | None = None) -> None:
+    def __init__(self, field: NerfactoParameters, device: torch.device | None = None) -> None:
         super().__init__(field.bounds, device)
         self.field = field
         self._base = TorchHashNetwork(field.base, self.device)

@@ -115,7 +115,8 @@ class PlenOctreeField(ExternalField):
         names = ("child", "data", "scale", "offset")
         if missing := [name for name in names if name not in arrays]:
             raise FieldError(f"tensor missing: {missing[0]}")
-        return cls(*(arrays[name] for name in names), terms=options["terms"])
+        child, data, scale, offset = (arrays[name] for name in names)
+        return cls(child, data, scale, offset, terms=options["terms"])
 
     def _torch_field(self) -> TorchField:
         from cagefield.fields.external.plenoctree_torch import TorchPlenOctree

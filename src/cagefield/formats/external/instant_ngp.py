@@ -28,12 +28,8 @@ from cagefield.errors import CameraError, FieldError
 from cagefield.fields.external.external_field import frozen_array, number, whole_number
 from cagefield.fields.external.hash_grid import HashGrid, expected_entries
 from cagefield.fields.external.hash_network import HashNetwork, Layers
-from cagefield.fields.external.instant_ngp import (
-    CASCADE_BYTES,
-    DIRECTION_TERMS,
-    GRID_CELLS,
-    InstantNgpField,
-)
+from cagefield.fields.external.instant_ngp import InstantNgpField
+from cagefield.fields.external.instant_ngp_parameters import CASCADE_BYTES, DIRECTION_TERMS, GRID_CELLS
 from cagefield.files import msgpack
 from cagefield.files.memory import memory_shortage
 from cagefield.files.safe_open import UnreadableError, check_regular, open_regular

@@ -23,7 +23,8 @@ from cagefield.datasets.nerf_normalization import Similarity
 from cagefield.errors import FieldError
 from cagefield.fields.external.hash_grid import HashGrid, expected_entries
 from cagefield.fields.external.hash_network import HashNetwork, Layers
-from cagefield.fields.external.nerfacto import DIRECTION_TERMS, NerfactoField
+from cagefield.fields.external.nerfacto import NerfactoField
+from cagefield.fields.external.nerfacto_parameters import DIRECTION_TERMS
 from cagefield.formats.external.checkpoint import ExternalCheckpoint, StateDict
 from cagefield.formats.external.nerfstudio_config import (
     TRANSFORMS,
