@@ -107,7 +107,7 @@ class PagePictures:
                 "- Samples: of a ray that meets something; reads of textures for each, leaps included.",
                 "- Sent: the edits' file. Uploaded: what a new state of the edits puts on the GPU. Lattice: "
                 "largest and mean error of halves, in voxels, against float32 nodes; of the lattice itself "
-                "see `flow_lattice.md`.",
+                "see `flow_shell_nodes.md`.",
                 "- Page, kernel: a picture of 200x150, the page's in software (SwiftShader).",
                 f"- {cpu_model()}, 2 cores. `python -m benchmarks.page_pictures FOLDER`",
                 "",

@@ -116,12 +116,12 @@ def counted(monkeypatch: pytest.MonkeyPatch, module: Any, name: str) -> list[int
 
 def test_refresh_of_one_edit_in_ten_is_that_of_one_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     from cagefield.rendering.voxels import occupancy_continuous
-    from cagefield.warps import flow_lattice
+    from cagefield.warps import flow_shell_nodes
 
     def work(stack: EditStack, number: int) -> list[list[int]]:
         start = VoxelRenderer(field(), stack)
         counts = [
-            counted(monkeypatch, flow_lattice, "sample"),
+            counted(monkeypatch, flow_shell_nodes, "sample"),
             counted(monkeypatch, occupancy_continuous, "images_of"),
             counted(monkeypatch, occupancy_continuous, "_refined"),
         ]
@@ -140,12 +140,12 @@ def test_refresh_of_one_edit_in_ten_is_that_of_one_alone(monkeypatch: pytest.Mon
 
 def test_lattices_of_the_others_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     from cagefield.edits.device_stack import DeviceStack
-    from cagefield.warps import flow_lattice
+    from cagefield.warps import flow_shell_nodes
 
     # All in the same outer cage: what one of them costs does not depend on where the others are.
     chain = EditStack(HALF.rotate((0, 0, 0.01 * number)) for number in range(10))
     packed = DeviceStack.from_stack(chain)
-    sampled = counted(monkeypatch, flow_lattice, "sample")
+    sampled = counted(monkeypatch, flow_shell_nodes, "sample")
     again = DeviceStack.from_stack(chain.set(6, chain[6].scale(1.01)))
     assert sampled == [3 * 8**3]
     others = [n for n in range(10) if n != 6]

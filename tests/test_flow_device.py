@@ -126,13 +126,13 @@ def test_lattice_with_the_references_steps_is_the_reference(
 
 
 def test_nodes_that_are_lost_are_marched_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cagefield.warps import flow_lattice
+    from cagefield.warps import flow_shell_nodes
 
     if devices.is_gpu():
         pytest.skip("a GPU marches every node by itself")
     edit = EDITS["bent cages"]
     vectors, _ = nodes_and_reference(edit, 9)
-    monkeypatch.setattr(flow_lattice.devices, "is_gpu", lambda: True)  # marks all of them
+    monkeypatch.setattr(flow_shell_nodes.devices, "is_gpu", lambda: True)  # marks all of them
     singly, expected = nodes_and_reference(edit.replace(name="again"), 9)
     assert not np.array_equal(vectors, singly)
     # Both are off by the same integration; what is between them is far less.

@@ -12,7 +12,7 @@ from cagefield.geometry import bspline_lattice, hexahedron
 from cagefield.typing import Array
 from cagefield.warps import LatticeShell
 from cagefield.warps.lattice_flow import sampled, slope_bound
-from cagefield.warps.lattice_way import MOST_TURN, Piece
+from cagefield.warps.lattice_motion import MOST_TURN, Piece
 from lattice_edits import random_lattice_edit
 
 ARM = Cage.box((0, 0, 0), (0.3, 0.3, 1.0)).subdivided((1, 1, 4))

@@ -17,12 +17,12 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.rendering.renderers import renderer_of
 from cagefield.selection import Elements, Selection
+from cagefield.selection.brush_and_lasso import Lasso, Rectangle, Stroke, elements_in_region
 from cagefield.selection.element_positions import deformed_positions
 from cagefield.selection.elements import ATTRIBUTES, histogram
 from cagefield.selection.field_elements import MAX_GRID_CELLS, elements_of_field, without_elements
 from cagefield.selection.floater_preset import floaters
 from cagefield.selection.neighborhoods import flood, grow, interior, shrink
-from cagefield.selection.screen_regions import Lasso, Rectangle, Stroke, elements_in_region
 from scenes import ball_field
 from solid_fields import solid_field
 from splat_scenes import ball_of_splats, random_splats

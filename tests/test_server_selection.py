@@ -16,7 +16,7 @@ from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage
 from cagefield.scene.scene import Scene
 from cagefield.selection import Selection
-from cagefield.selection.screen_regions import Rectangle, Stroke
+from cagefield.selection.brush_and_lasso import Rectangle, Stroke
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol.client_messages import page_messages

@@ -1,5 +1,9 @@
 from .bounding_cages import lattice_cells as lattice_cells
 from .bounding_cages import oriented_box as oriented_box
+from .brush_and_lasso import Lasso as Lasso
+from .brush_and_lasso import Rectangle as Rectangle
+from .brush_and_lasso import Stroke as Stroke
+from .brush_and_lasso import elements_in_region as elements_in_region
 from .element_positions import DeformedPositions as DeformedPositions
 from .element_positions import deformed_positions as deformed_positions
 from .element_selection import Selection as Selection
@@ -13,7 +17,3 @@ from .floater_preset import floaters as floaters
 from .neighborhoods import flood as flood
 from .neighborhoods import grow as grow
 from .neighborhoods import shrink as shrink
-from .screen_regions import Lasso as Lasso
-from .screen_regions import Rectangle as Rectangle
-from .screen_regions import Stroke as Stroke
-from .screen_regions import elements_in_region as elements_in_region

@@ -12,7 +12,7 @@ from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Float32
 from cagefield.warps.extended_coordinates import Extended
 from cagefield.warps.falloff import Falloff
-from cagefield.warps.lattice_way import Piece
+from cagefield.warps.lattice_motion import Piece
 
 STEP_STRAIN = 0.8
 """Most h |dv/dz| of a step; one is one to one below 2, where 1 - h/2 dv/dz is invertible."""

@@ -12,10 +12,10 @@ from cagefield.geometry.cage import Cage, LatticeCage
 from cagefield.typing import Array, Float32, Mask
 from cagefield.warps.cage_maps import flow_between, inner_map_between
 from cagefield.warps.falloff import Falloff
-from cagefield.warps.flow_nodes import flow_nodes
+from cagefield.warps.free_form_nodes import flow_nodes
 from cagefield.warps.interfaces import InnerMap, NoInnerMap
 from cagefield.warps.lattice_flow import LatticeFlow, outer_distance, outer_distance_gradient
-from cagefield.warps.lattice_way import Piece, pieces_between
+from cagefield.warps.lattice_motion import Piece, pieces_between
 from cagefield.warps.newton_inverse import inverted
 
 GRIDS: tuple[int, ...] = (20, 32, 48)

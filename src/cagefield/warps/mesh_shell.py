@@ -12,7 +12,7 @@ from cagefield.geometry.mesh_cage import MeshCage
 from cagefield.typing import Array, Float32
 from cagefield.warps.cage_maps import flow_between, inner_map_between
 from cagefield.warps.falloff import Falloff
-from cagefield.warps.flow_nodes import flow_nodes
+from cagefield.warps.free_form_nodes import flow_nodes
 from cagefield.warps.interfaces import InnerMap, NoInnerMap
 from cagefield.warps.mesh_flow import MeshFlow, MeshPiece, pieces_of_mesh
 

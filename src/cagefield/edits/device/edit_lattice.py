@@ -12,7 +12,7 @@ from cagefield.edits.device.kernels.edit_lattice import sample_lattice
 from cagefield.edits.device.packing import pack_warp
 from cagefield.errors import EditError
 from cagefield.files import memory
-from cagefield.warps import FreeFormFlow, LatticeShell, MeshShell, flow_lattice
+from cagefield.warps import FreeFormFlow, LatticeShell, MeshShell, flow_shell_nodes
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.lattice import Lattice
@@ -26,8 +26,8 @@ _UNCHECKED_NODES_PER_AXIS = 64
 LATTICE_STRAIN = 1.0
 """Strain of a step (see `FlowShell`) for a lattice of up to 32^3 nodes; finer ones take (R / 32)^-1/2 of it.
 
-Chosen by measurement over the edits of `benchmarks/flow_lattice.py`: error that the integration adds to the
-interpolation's own, worst of the edits, in the mean and in the largest error:
+Chosen by measurement over the edits of `benchmarks/flow_shell_nodes.py`: error that the integration adds to
+the interpolation's own, worst of the edits, in the mean and in the largest error:
 
     strain    1.0          0.7          0.5          0.35
     32^3      1% and 4%    0% and 1%    0% and 0%    0% and 0%
@@ -49,7 +49,7 @@ def sample_nodes(warp: ContinuousWarp, resolution: int) -> NDArray[np.float32]:
     devices.start()
     if isinstance(warp.shell, FlowShell):
         strain = LATTICE_STRAIN * min(1.0, (32.0 / resolution) ** 0.5)
-        return flow_lattice.sample(warp.shell.with_strain(strain), resolution)
+        return flow_shell_nodes.sample(warp.shell.with_strain(strain), resolution)
     if isinstance(warp.shell, LatticeShell | MeshShell):
         return warp.shell.sample(resolution)
     if isinstance(warp.shell, FreeFormFlow):

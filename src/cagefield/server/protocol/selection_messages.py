@@ -11,7 +11,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, FiniteFloat
 
-from cagefield.selection.screen_regions import MAX_REGION_POINTS, MAX_SHARE
+from cagefield.selection.brush_and_lasso import MAX_REGION_POINTS, MAX_SHARE
 from cagefield.server.protocol.common import Message
 
 CageShape: TypeAlias = Literal["box", "lattice", "mesh"]

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from cagefield.cameras.camera import Camera
+from cagefield.selection.brush_and_lasso import Lasso, Rectangle, Stroke
 from cagefield.selection.element_selection import Selection
 from cagefield.selection.elements import Attribute
-from cagefield.selection.screen_regions import Lasso, Rectangle, Stroke
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,13 @@ import numpy as np
 from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
+from cagefield.selection.brush_and_lasso import elements_in_region
 from cagefield.selection.element_positions import DeformedPositions, deformed_positions
 from cagefield.selection.element_selection import Selection
 from cagefield.selection.elements import Elements, histogram
 from cagefield.selection.field_elements import elements_of_field
 from cagefield.selection.floater_preset import floaters
 from cagefield.selection.neighborhoods import flood, grow, interior, shrink
-from cagefield.selection.screen_regions import elements_in_region
 from cagefield.selection.selection_cages import cage_around
 from cagefield.server.render_worker.picks import (
     EveryPick,

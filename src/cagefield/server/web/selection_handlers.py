@@ -7,8 +7,8 @@ import numpy as np
 from cagefield.cameras.camera import Camera
 from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage
+from cagefield.selection.brush_and_lasso import Lasso, Rectangle, Stroke
 from cagefield.selection.element_selection import Selection
-from cagefield.selection.screen_regions import Lasso, Rectangle, Stroke
 from cagefield.server.editor.session import NOTHING_SELECTED
 from cagefield.server.protocol import selection_messages as messages
 from cagefield.server.protocol.server_messages import HistogramCounts

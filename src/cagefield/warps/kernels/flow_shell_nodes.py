@@ -1,4 +1,4 @@
-"""The kernels of `cagefield.warps.flow_lattice`."""
+"""The kernels of `cagefield.warps.flow_shell_nodes`."""
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 

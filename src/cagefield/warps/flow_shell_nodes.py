@@ -19,7 +19,7 @@ from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.devices import floats
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.flow_table import table
-from cagefield.warps.kernels.flow_lattice import (
+from cagefield.warps.kernels.flow_shell_nodes import (
     LOST,
     NODES_PER_BATCH,
     march,

@@ -1,6 +1,6 @@
 """Cost of refreshing the flow shell's lattice during a drag, and the lattice's error.
 
-    python -m benchmarks.flow_lattice
+    python -m benchmarks.flow_shell_nodes
 
 A refresh is everything from the new edit to its packed lattice: checks, the cage's way, the kernel. "CPU" is
 the process's time, all cores together, least over the rounds; the estimate is Python's share of it plus the
@@ -150,13 +150,13 @@ def main() -> None:
     """Measure, show, write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--rounds", type=int, default=9)
-    parser.add_argument("-o", "--out", type=Path, default=Path("benchmarks/results/flow_lattice.md"))
+    parser.add_argument("-o", "--out", type=Path, default=Path("benchmarks/results/flow_shell_nodes.md"))
     options = parser.parse_args()
     devices.start("cpu")
     cores = devices.threads()
     machine = f"Machine: {Machine.here()}"
     command = (
-        "Command: `python -m benchmarks.flow_lattice`. CPU: milliseconds of all cores together, least of "
+        "Command: `python -m benchmarks.flow_shell_nodes`. CPU: milliseconds of all cores together, least of "
     )
     command += f"{options.rounds} rounds; wall: while the machine did other things, too."
     measured = ("CPU", "estimate", "wall", "voxels")
