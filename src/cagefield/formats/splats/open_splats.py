@@ -91,10 +91,10 @@ def format_suffix(path: Path) -> str:
     return max((ending for ending in READABLE if name.endswith(ending)), key=len, default="")
 
 
-def open_splats(path: Path) -> SplatSource:
+def open_splats(path: Path, time_code: float | None = None) -> SplatSource:
     """Open splat file; values are read batch by batch.
 
-    A warning names a content of another format than the suffix.
+    `time_code` is one of a USD file. A warning names a content of another format than the suffix.
 
     Raises:
         FieldError: missing file, unknown format, or a damaged file.
@@ -115,6 +115,10 @@ def open_splats(path: Path) -> SplatSource:
     if not path.is_dir() and not path.name.lower().endswith((found, *_ALSO_VALID_SUFFIXES.get(found, ()))):
         said = f"not what its name says ({ending})" if ending else "which its name does not say"
         warnings.warn(f"{path}: its content is {_NAMES[found]}, {said}; it is read as that", stacklevel=2)
+    if time_code is not None:
+        if _OPEN[found] is not open_splat_usd:
+            raise FieldError(f"{path}: time codes are USD's; leave --time-code out")
+        return open_splat_usd(path, time_code)
     return _OPEN[found](path)
 
 

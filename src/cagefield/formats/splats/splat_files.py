@@ -63,22 +63,27 @@ _MAX_SH_DEGREE = {".compressed.ply": 3, ".sog": 3, ".glb": 3, ".splat": 0}
 
 
 def read_splats(
-    path: str | Path, axes: Axes | None = None, on_progress: OnProgress = lambda _: None
+    path: str | Path,
+    axes: Axes | None = None,
+    on_progress: OnProgress = lambda _: None,
+    *,
+    time_code: float | None = None,
 ) -> SplatField:
     """SplatField of a splat file, in PLY's axes (x right, y down, z forward).
 
-    `axes` replaces the axes that the file or its format states. Splats with non-finite values are left out,
+    `axes` replaces the axes that the file or its format states. `time_code` is one of a USD file's, else its
+    first. Splats with non-finite values are left out,
     with one warning.
 
     Raises:
         FieldError: missing file, unknown format, or a damaged file or one without visible splats.
     """
-    return read_source(open_within_memory(Path(path)), axes, on_progress)
+    return read_source(open_within_memory(Path(path), time_code), axes, on_progress)
 
 
-def open_within_memory(path: Path) -> SplatSource:
+def open_within_memory(path: Path, time_code: float | None = None) -> SplatSource:
     """Open splat file. Raises FieldError as `open_splats`, and for splats that exceed the memory."""
-    source = open_splats(path)
+    source = open_splats(path, time_code)
     needed = 4 * source.count * sum(map(math.prod, _shapes(source)))
     if (lacking := memory_shortage(needed)) is not None:
         raise FieldError(f"{path}: its {source.count} splats are too many: {lacking}")

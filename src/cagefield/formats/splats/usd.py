@@ -167,7 +167,7 @@ def _check_references(usd: Any, path: Path, layer: Any) -> None:
                 continue
             known.add(name)
             package = name.split("[", 1)[0].split(":SDF_FORMAT_ARGS", 1)[0]
-            file = real_path(package)
+            file = real_path(folder / package)
             if not file.is_relative_to(folder):
                 raise FieldError(f"{path}: it refers to {asset!s:.80}, outside of its folder; flatten it")
             if len(known) > MAX_LAYERS:

@@ -118,8 +118,9 @@ def _layer(usd: Any, path: Path, info: StageInfo, frames: Iterable[Frame], on_pr
         if any(offset):
             _transform(usd, prim, "translate", "double3").default = usd.Gf.Vec3d(*offset)
     for number, frame in enumerate(frames):
-        for prim, table in zip(prims, frame, strict=True):
-            _add_values(usd, layer, path, prim, info, table, None if info.fps is None else float(number))
+        for n, (prim, table) in enumerate(zip(prims, frame, strict=True)):
+            if info.is_written(n, number):
+                _add_values(usd, layer, path, prim, info.sh_degree, table, info.time_code(n, number))
         on_progress(0.8 * (number + 1) / info.frames)
     if info.camera:
         _add_camera(usd, layer, info)
@@ -141,17 +142,17 @@ def _transform(usd: Any, prim: Any, kind: str, type_name: str) -> Any:
 
 
 def _add_values(
-    usd: Any, layer: Any, path: Path, prim: Any, info: StageInfo, table: SplatTable | None, time: float | None
+    usd: Any, layer: Any, path: Path, prim: Any, sh_degree: int, table: SplatTable | None, time: int | None
 ) -> None:
     """Set the attributes of a prim at a time code, or without one."""
     count = 0 if table is None else table.count
-    needed = 8 * count * (_FLOATS_PER_SPLAT + 3 * (info.sh_degree + 1) ** 2)  # here, and in the library
+    needed = 8 * count * (_FLOATS_PER_SPLAT + 3 * (sh_degree + 1) ** 2)  # here, and in the library
     if (lacking := memory_shortage(needed)) is not None:
         raise FieldError(f"{path}: too many splats for {path.suffix}: {lacking}; or write .usda or .ply")
     bounds = ExtentBounds()
     parts: list[list[AnyArray]] = [[] for _ in COLUMNS]
-    for batch in [no_splats(info.sh_degree)] if table is None else table.batches():
-        padded = batch.pad_harmonics(info.sh_degree)
+    for batch in [no_splats(sh_degree)] if table is None else table.batches():
+        padded = batch.pad_harmonics(sh_degree)
         bounds.add(padded)
         for part, column in zip(parts, COLUMNS, strict=True):
             part.append(column.values(padded))
@@ -161,7 +162,7 @@ def _add_values(
 
 
 def _set(
-    usd: Any, layer: Any, prim: Any, name: str, type_name: str, rows: AnyArray, time: float | None
+    usd: Any, layer: Any, prim: Any, name: str, type_name: str, rows: AnyArray, time: int | None
 ) -> None:
     Sdf, Vt = usd.Sdf, usd.Vt
     array = {"quatf[]": Vt.QuatfArray, "float[]": Vt.FloatArray}.get(type_name, Vt.Vec3fArray)
@@ -175,7 +176,7 @@ def _set(
     if time is None:
         spec.default = value
     else:
-        layer.SetTimeSample(spec.path, time, value)
+        layer.SetTimeSample(spec.path, float(time), value)
 
 
 def _add_camera(usd: Any, layer: Any, info: StageInfo) -> None:

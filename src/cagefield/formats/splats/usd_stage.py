@@ -73,6 +73,7 @@ class StageInfo:
     """Values of a stage beside its splats.
 
     `names` are the prims' names, `offsets` their translations. `fps` is None for a stage without time codes.
+    Prims whose number is in `still` have their splats of the first frame, without time samples.
     `camera` has a pose for each frame, or none; `aspect` is width over height.
     """
 
@@ -83,9 +84,18 @@ class StageInfo:
     frames: int = 1
     camera: tuple[Pose, ...] = ()
     aspect: float = 1.0
+    still: frozenset[int] = frozenset()
+
+    def time_code(self, prim: int, frame: int) -> int | None:
+        """Time code of a prim's splats in a frame; None for values without time samples."""
+        return None if self.fps is None or prim in self.still else frame
+
+    def is_written(self, prim: int, frame: int) -> bool:
+        """Whether a prim has values of its own in a frame."""
+        return frame == 0 or self.time_code(prim, frame) is not None
 
     @classmethod
-    def still(cls, name: str, table: SplatTable) -> StageInfo:
+    def from_table(cls, name: str, table: SplatTable) -> StageInfo:
         """Stage of one table without time codes."""
         return cls(prim_names([name]), table.sh_degree, (table.offset,))
 

@@ -49,28 +49,32 @@ def write_usda(
             for _ in info.names
         ]
         for number, frame in enumerate(frames):
-            for spools, table in zip(files, frame, strict=True):
-                _append(spools, info, number, () if table is None else table.batches())
+            for prim, (spools, table) in enumerate(zip(files, frame, strict=True)):
+                if info.is_written(prim, number):
+                    batches = () if table is None else table.batches()
+                    _append(spools, info.sh_degree, info.time_code(prim, number), batches)
             on_progress(0.8 * (number + 1) / info.frames)
         with replaced_file(path) as temporary, temporary.open("w", encoding="ascii", newline="\n") as out:
             out.write(_header(info))
             for n, name in enumerate(info.names):
-                _write_prim(out, info, name, info.offsets[n], files[n])
+                _write_prim(out, info, n, name, files[n])
                 on_progress(0.8 + 0.2 * (n + 1) / len(info.names))
             if info.camera:
                 out.write(_camera(info))
             out.write("}\n")
 
 
-def _append(spools: Sequence[IO[str]], info: StageInfo, number: int, batches: Iterable[SplatBatch]) -> None:
+def _append(
+    spools: Sequence[IO[str]], sh_degree: int, time_code: int | None, batches: Iterable[SplatBatch]
+) -> None:
     """Append the values of a prim at a time code to the files of its attributes."""
     bounds = ExtentBounds()
-    start = "[" if info.fps is None else f"            {number}: ["
+    start = "[" if time_code is None else f"            {time_code}: ["
     for file in spools[1:]:
         file.write(start)
     is_first = True
     for batch in batches:
-        padded = batch.pad_harmonics(info.sh_degree)
+        padded = batch.pad_harmonics(sh_degree)
         bounds.add(padded)
         for file, column in zip(spools[1:], COLUMNS, strict=True):
             _write_rows(file, column.values(padded), is_first)
@@ -78,7 +82,7 @@ def _append(spools: Sequence[IO[str]], info: StageInfo, number: int, batches: It
     spools[0].write(start)
     _write_rows(spools[0], bounds.rows(), True)
     for file in spools:
-        file.write("]" if info.fps is None else "],\n")
+        file.write("]" if time_code is None else "],\n")
 
 
 def _write_rows(file: IO[str], rows: AnyArray, is_first: bool) -> None:
@@ -103,19 +107,20 @@ def _header(info: StageInfo) -> str:
     )
 
 
-def _write_prim(
-    out: IO[str], info: StageInfo, name: str, offset: tuple[float, ...], spools: Sequence[IO[str]]
-) -> None:
+def _write_prim(out: IO[str], info: StageInfo, prim: int, name: str, spools: Sequence[IO[str]]) -> None:
+    begin, end = " = ", "\n"
+    if info.time_code(prim, 0) is not None:
+        begin, end = ".timeSamples = {\n", "        }\n"
     out.write(f'    def {PRIM_TYPE} "{name}"\n    {{\n')
     for (attribute, type_name), file in zip(_ATTRIBUTES, spools, strict=True):
-        out.write(f"        {type_name} {attribute}" + (" = " if info.fps is None else ".timeSamples = {\n"))
+        out.write(f"        {type_name} {attribute}{begin}")
         file.seek(0)
         while part := file.read(_COPY_CHARACTERS):
             out.write(part)
-        out.write("\n" if info.fps is None else "        }\n")
+        out.write(end)
     out.write(f"        uniform int {SH_DEGREE} = {info.sh_degree}\n")
-    if any(offset):
-        shift = ", ".join(f"{value:.17g}" for value in offset)
+    if any(info.offsets[prim]):
+        shift = ", ".join(f"{value:.17g}" for value in info.offsets[prim])
         out.write(
             f"        double3 xformOp:translate = ({shift})\n"
             '        uniform token[] xformOpOrder = ["xformOp:translate"]\n'
