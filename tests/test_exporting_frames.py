@@ -112,7 +112,9 @@ def test_the_camera_of_the_path_looks_at_the_splats(tmp_path: Path) -> None:
 def test_scenes_and_pastes_are_prims(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     heap = random_splats(60, degree=1)
     write_splats(heap, tmp_path / "heap.ply")
-    paste = Edit.paste(str(tmp_path / "heap.ply"), Cage.box((0, 0, 0), 4.0), name="the heap").replace(relight="none")
+    paste = Edit.paste(str(tmp_path / "heap.ply"), Cage.box((0, 0, 0), 4.0), name="the heap").replace(
+        relight="none"
+    )
     folder = saved(tmp_path, scene_with(MOVED, paste.translate((3, 0, 0))))
     Scene(random_splats(30)).save(tmp_path / "other")
     out = tmp_path / "x.usda"
