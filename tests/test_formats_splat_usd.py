@@ -80,7 +80,7 @@ def test_files_are_valid_by_the_schema_registry(tmp_path: Path, suffix: str) -> 
     stage = Usd.Stage.Open(str(tmp_path / f"x{suffix}"))
     schema = Usd.SchemaRegistry().FindConcretePrimDefinition(PRIM_TYPE)
     prim = prim_of(stage)
-    assert str(prim.GetPath()) == "/World/x" and stage.GetDefaultPrim().GetName() == "World"
+    assert str(prim.GetPath()) == "/World/splats" and stage.GetDefaultPrim().GetName() == "World"
     for spec in (attribute for attribute in prim.GetAuthoredAttributes()):
         if spec.GetName() == "xformOp:translate":
             continue
@@ -121,7 +121,7 @@ def test_two_readers_see_the_values(tmp_path: Path, suffix: str) -> None:
         pytest.skip("tinyusdz has wheels for Python 3.11 and later")
     tinyusdz = pytest.importorskip("tinyusdz", reason="the second reader, of the extra test")
     second = tinyusdz.load(str(tmp_path / f"x{suffix}"))
-    other = second.get_prim_at_path("/World/x")
+    other = second.get_prim_at_path("/World/splats")
     assert other.type_name == PRIM_TYPE
     for name, values in expected.items():
         text = other.get_attribute(name).value.to_string()
@@ -154,7 +154,7 @@ def test_a_package_has_its_content_at_64_bytes(tmp_path: Path) -> None:
             + int.from_bytes(head[26:28], "little")
             + int.from_bytes(head[28:30], "little")
         )
-        assert entry.filename == "name.usdc" and entry.compress_type == zipfile.ZIP_STORED
+        assert entry.filename == "splats.usdc" and entry.compress_type == zipfile.ZIP_STORED
         assert begin % 64 == 0
         assert (tmp_path / "name.usdz").read_bytes()[begin:].startswith(b"PXR-USDC")
 

@@ -80,6 +80,7 @@ def write_usdz(
             with inner.open("rb") as source, archive.open(entry, "w") as out:
                 while part := source.read(1 << 22):
                     out.write(part)
+        on_progress(1.0)
 
 
 def _export(usd: Any, layer: Any, path: Path) -> None:

@@ -43,5 +43,5 @@ def check_usd(path: Path) -> None:
 
 
 def write_splat_usd(path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None) -> None:
-    """Write splats in the axes "rub" as one prim, named by the file; complete or not at all."""
-    write_usd_stage(path, StageInfo.from_table(path.stem, table), [(table,)], on_progress)
+    """Write splats in the axes "rub" as one prim, /World/splats; complete or not at all."""
+    write_usd_stage(path, StageInfo.from_table("splats", table), [(table,)], on_progress)
