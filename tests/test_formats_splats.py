@@ -24,6 +24,7 @@ from cagefield.formats.splats.sog_writer import build_codebook
 from cagefield.formats.splats.splat_files import WRITABLE, convert_splats, read_splats, write_splats
 from cagefield.formats.splats.splat_table import FieldTable, SplatBatch
 from cagefield.formats.splats.spz_writer import write_spz
+from cagefield.formats.splats.usd_writer import USD_SUFFIXES
 from cagefield.geometry.quaternions import rotation_matrices
 from commands import printed, refused
 from splat_damage import SLACK, attack, ksplat_of, sample_files, splatfacto_tensors
@@ -38,6 +39,7 @@ SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "splats"
 BOUNDS = {
     ".ply": (1e-6, 1e-5, 1e-6, 1e-6, 1e-6, 1e-6),
     ".glb": (1e-6, 1e-5, 1e-6, 1e-6, 1e-6, 1e-6),
+    **dict.fromkeys(USD_SUFFIXES, (1e-6, 1e-5, 1e-6, 1e-6, 1e-6, 1e-6)),
     ".splat": (1e-6, 1e-5, 1e-4, 2.1e-3, 7e-3, np.inf),
     ".spz": (2.2e-4, 0.032, 1e-5, 2.1e-3, 0.0135, 0.0665),
     ".compressed.ply": (1.3e-3, 2e-3, 4e-6, 2.1e-3, 3.5e-3, 0.0161),
@@ -100,7 +102,9 @@ def test_the_antialiased_filter_is_kept(tmp_path: Path, ending: str) -> None:
         field.means, field.log_scales, field.quaternions, field.opacities, field.sh, antialiased=True
     )
     write_splats(field, tmp_path / f"a{ending}")
-    assert read_splats(tmp_path / f"a{ending}").antialiased == (ending != ".glb")  # glTF cannot say it
+    assert read_splats(tmp_path / f"a{ending}").antialiased == (
+        ending not in (".glb", *USD_SUFFIXES)  # glTF and USD cannot say it
+    )
 
 
 @pytest.mark.parametrize("axes", AXES)
@@ -346,7 +350,10 @@ def test_genuine_files_pass_through_every_format(tmp_path: Path, name: str, endi
     size = float(np.ptp(field.means, axis=0).max())
     distance, at = cKDTree(got.means).query(field.means)
     assert len(got) == len(field)
-    assert distance.max() <= {".ply": 1e-6, ".glb": 1e-6, ".splat": 1e-6}.get(ending, 2e-3) * size
+    assert (
+        distance.max()
+        <= dict.fromkeys((".ply", ".glb", ".splat", *USD_SUFFIXES), 1e-6).get(ending, 2e-3) * size
+    )
     near = np.abs(got.sh[at][:, :1] - field.sh[:, :1]).max(axis=(1, 2))
     step = np.ptp(field.sh[:, 0], axis=0).max() / 510.0 if ending == ".compressed.ply" else 0.0
     assert np.median(near) <= max(BOUNDS[ending][4], step)

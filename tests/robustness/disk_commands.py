@@ -69,7 +69,7 @@ class DiskCommand:
         return [*words, "--overwrite"] if again else words
 
 
-_SPLAT_ENDINGS = (".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".glb")
+_SPLAT_ENDINGS = (".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".glb", ".usda", ".usdc", ".usdz")
 _TRAIN = "train {s}/photos -o {out} --steps 3 --resolution 16"
 _BAKING = "--resolution 16 --compare 0"
 _EDITS = (

@@ -136,6 +136,9 @@ def splat_readers(count: int = 120, old_spz: int = 100) -> dict[str, Reader]:
             {"sog/meta.json": "json", "sog/means_l.webp": "bytes", "sog/shN_labels.webp": "bytes"},
         ),
         "glb": _splat_reader(".glb", "glb", count),
+        "usda": _splat_reader(".usda", "text", count),
+        "usdc": _splat_reader(".usdc", "bytes", count),
+        "usdz": _splat_reader(".usdz", "bytes", count),
         "glb scene": Reader(partial(_make_glb_scene, count), partial(_read, "a.glb"), {"a.glb": "glb"}),
         "gltf scene": Reader(
             partial(_make_gltf_scene, count), partial(_read, "a.gltf"), {"a.gltf": "json", "a.bin": "bytes"}

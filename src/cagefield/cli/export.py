@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from cagefield.geometry.cage import Cage
     from cagefield.pages.path_states import PathEdits
     from cagefield.scene.scene import Scene
+    from cagefield.typing import Array
 
 What = Literal["splats", "mesh", "points", "page"]
 
@@ -46,8 +47,9 @@ class Export:
     scene: tyro.conf.Positional[Path]
     """Scene folder."""
     out: Output
-    """Splats: .ply, .compressed.ply, .spz, .sog, .splat or .glb; a mesh: .ply or .glb; points: .ply; a page
-    that any browser opens without a server: .html; with --embed a folder."""
+    """Splats: .ply, .compressed.ply, .spz, .sog, .splat, .glb, .usda, .usdc or .usdz; a mesh: .ply or .glb;
+    points: .ply; a page that any browser opens without a server: .html; with --embed a folder. A name with
+    %04d, such as frame_%04d.ply: a file of splats for each frame of the camera path."""
     what: Annotated[What, tyro.conf.arg(name="as")] = "splats"
     """Kind of file; a file that ends in .html is a page."""
     embed: Flag = False
@@ -65,6 +67,13 @@ class Export:
     source_coordinates: Flag = False
     """Coordinates of the reconstruction that the photos' poses came from, before the scene was leveled, moved
     or scaled (COLMAP's; nerfstudio's before applied_transform)."""
+    camera_path: Path | None = None
+    """Camera path whose keyframes move the edits: time samples of a USD file, or the files of a sequence;
+    a sequence takes the scene's own if left out."""
+    fps: float = 24.0
+    """Frames per second along the camera path."""
+    add: tuple[Path, ...] = ()
+    """Further scenes of splats in a USD file, each a prim of its own."""
     spz_version: SpzVersion | None = None
     """Version of an .spz file; left out, 3, which Spark opens, too."""
     splats: int | None = None
@@ -78,10 +87,14 @@ class Export:
     """Voxels along a mesh's longest axis; left out, the field's own."""
     device: Device = "auto"
     overwrite: Flag = False
-    """Replace the file that is there."""
+    """Replace the file that is there; of a sequence those of its frames, which are kept otherwise."""
 
     def run(self) -> None:
         """Bake or fit, write, and print the contents of the file."""
+        from cagefield.exporting.sequences import is_sequence
+
+        if self.what == "splats" and not self.embed and is_sequence(self.out):
+            return self._sequence()
         if self.embed or self.out.suffix.lower() == ".html":
             return self._page()
         self._check()
@@ -90,6 +103,8 @@ class Export:
         from cagefield.scene.scene import Scene
 
         scene = Scene.open(self.scene)
+        if self.camera_path is not None or self.add or (_is_usd(self.out) and _pastes(scene)):
+            return self._stage(scene)
         cages = () if self.selection is None else cages_of(self.selection, scene.edits)
         devices.start(self.device)
         write = {"splats": self._splats, "mesh": self._mesh, "points": self._points}[self.what]
@@ -109,6 +124,10 @@ class Export:
             raise CagefieldError("a page shows the whole scene; leave out --selection and --axes")
         if self.source_coordinates:
             raise CagefieldError("a page shows the scene's coordinates; leave out --source-coordinates")
+        if self.camera_path is not None or self.add:
+            raise CagefieldError(
+                "a page shows the scene's own camera path; leave out --camera-path and --add"
+            )
         if self.embed and self.out.suffix.lower() == ".html":
             raise CagefieldError(f"{self.out}: --embed writes a folder; give a name without .html")
         if self.embed:
@@ -153,6 +172,77 @@ class Export:
             name = real_path(self.out).name
             print(f'<iframe src="{name}/{INDEX}" width="800" height="600" style="border: 0"></iframe>')
 
+    def _sequence(self) -> None:
+        """Write a file of splats for each frame, and print how many."""
+        from cagefield.compute import devices
+        from cagefield.exporting.path_frames import CameraPath
+        from cagefield.exporting.sequences import frame_file, write_sequence
+        from cagefield.files.atomic import check_writable
+        from cagefield.scene.scene import Scene
+
+        if self.selection is not None or self.source_coordinates or self.add:
+            raise CagefieldError(
+                "a sequence has all splats of one scene, upright; leave out --selection, "
+                "--source-coordinates and --add"
+            )
+        check_writable(frame_file(self.out, 0))
+        path = CameraPath.load(self.camera_path or self.scene / "camera_path.json", self.fps)
+        scene = Scene.open(self.scene)
+        devices.start(self.device)
+        with progress_bar("Frames") as move:
+            written, kept = write_sequence(
+                scene,
+                path,
+                self.out,
+                self._up(scene),
+                axes=self.axes,
+                spz_version=self.spz_version,
+                overwrite=self.overwrite,
+                on_progress=lambda done, note: move(done, 1.0, note),
+            )
+        again = f"; {kept} were there and are kept (--overwrite replaces them)" if kept else ""
+        print(f"{written + kept} frames of splats, {written} written{again}\nin {self.out}")
+
+    def _stage(self, scene: Scene) -> None:
+        """Write scenes, their pastes and their edits along a camera path as USD, and print the contents."""
+        from cagefield.compute import devices
+        from cagefield.exporting.path_frames import CameraPath
+        from cagefield.exporting.usd_scenes import StageScene, write_scenes_usd
+        from cagefield.scene.scene import Scene
+
+        if not _is_usd(self.out):
+            raise CagefieldError(
+                f"{self.out}: --camera-path and --add are for .usda, .usdc and .usdz; give such a name, "
+                "or one with %04d for a sequence"
+            )
+        if self.selection is not None or self.source_coordinates or self.axes is not None:
+            raise CagefieldError(
+                "a USD of several prims or frames has all splats, upright, y up; leave out --selection, "
+                "--source-coordinates and --axes"
+            )
+        path = None if self.camera_path is None else CameraPath.load(self.camera_path, self.fps)
+        folders = [self.scene, *self.add]
+        opened = [scene, *(Scene.open(folder) for folder in self.add)]
+        devices.start(self.device)
+        with progress_bar("Splats") as move:
+            info = write_scenes_usd(
+                self.out,
+                [
+                    StageScene(real_path(folder).name, one, self._up(one))
+                    for folder, one in zip(folders, opened, strict=True)
+                ],
+                path,
+                on_progress=lambda done: move(done, 1.0, ""),
+            )
+        times = "" if info.fps is None else f", {info.frames} time samples at {info.fps:g} frames per second"
+        print(f"prims: {', '.join(info.names)}; SH degree {info.sh_degree}{times}\nwritten to {self.out}")
+
+    def _up(self, scene: Scene) -> Array:
+        """Direction [3] that is up in a scene."""
+        from cagefield.scene.import_splats import axis_of
+
+        return scene.up if self.up is None else axis_of(self.up)
+
     def _check(self) -> None:
         """Check the options before anything is computed."""
         from cagefield.formats.mesh_files import MESH_SUFFIXES
@@ -183,7 +273,7 @@ class Export:
         from cagefield.exporting.source_coordinates import splats_in_source, world_to_source
         from cagefield.fields.splat_field import SplatField
         from cagefield.formats.splats.splat_files import write_splats
-        from cagefield.scene.import_splats import axis_of, nearest_up
+        from cagefield.scene.import_splats import nearest_up
 
         if isinstance(scene.field, SplatField):
             splats = edited_splats(scene)
@@ -197,7 +287,7 @@ class Export:
             moved = splats_in_source(splats, world_to_source(scene))
             write_splats(moved, self.out, self.axes, spz_version=self.spz_version)
             return f"{line}\nin the coordinates of the reconstruction"
-        up = scene.up if self.up is None else axis_of(self.up)
+        up = self._up(scene)
         turned = upright(splats, up)
         write_splats(turned, self.out, self.axes, spz_version=self.spz_version)
         if turned is not splats:
@@ -260,6 +350,22 @@ class Export:
             points, offset = points_in_source(points, world_to_source(scene))
         write_points(self.out, points.positions, points.rgb, points.normals, offset=offset)
         return f"{len(points)} points with normals and colours"
+
+
+def _is_usd(path: Path) -> bool:
+    from cagefield.formats.splats.usd_writer import USD_SUFFIXES
+
+    return path.suffix.lower() in USD_SUFFIXES
+
+
+def _pastes(scene: Scene) -> bool:
+    """Whether a scene of splats has splats of other scenes."""
+    from cagefield.edits import Paste
+    from cagefield.fields.splat_field import SplatField
+
+    return isinstance(scene.field, SplatField) and any(
+        isinstance(edit, Paste) and edit.enabled for edit in scene.edits
+    )
 
 
 def _along(along: PathEdits, scene: Scene) -> str:

@@ -22,7 +22,7 @@ Unbounded = Literal["auto", "on", "off"]
 
 @dataclass(frozen=True)
 class ImportField:
-    """Read a splat file (.ply, .spz, .sog, .splat, .ksplat, .glb, .gltf) or a checkpoint: a scene.
+    """Read a splat file (.ply, .spz, .sog, .splat, .ksplat, .glb, .gltf, USD) or a checkpoint: a scene.
 
     Splats stay splats and keep the file's coordinates, in the axes of PLY; a NeRF is baked into voxels.
     """
@@ -37,6 +37,8 @@ class ImportField:
     """Which way splats are turned, where --data is left out: most files have y pointing down."""
     axes: Axes | None = None
     """Where x, y and z of the file point, such as rdf (right, down, front); left out, as its format says."""
+    time_code: float | None = None
+    """Time code of a USD file with time samples; left out, the first."""
     unbounded: Unbounded = "auto"
     """Splats far away are surroundings: auto where they are much farther than most."""
     config: Path | None = None
@@ -77,7 +79,7 @@ class ImportField:
         if self.config is not None or self.fov_deg is not None:
             raise CagefieldError("--config and --fov-deg are for NeRFs; leave them out for splats")
         imported = import_splats(
-            read_splats(self.file, self.axes),
+            read_splats(self.file, self.axes, time_code=self.time_code),
             self.up,
             dataset=self._dataset(),
             unbounded={"auto": None, "on": True, "off": False}[self.unbounded],

@@ -320,7 +320,7 @@ export interface Drawing {
  */
 export interface ExportSplats {
   type: "export";
-  form: "ply" | "compressed.ply" | "spz" | "sog" | "splat" | "glb";
+  form: "ply" | "compressed.ply" | "spz" | "sog" | "splat" | "glb" | "usda" | "usdc" | "usdz";
 }
 /**
  * Shrinks the inner cage to the dense region inside it.

@@ -10,6 +10,9 @@ const FORMS: [ExportSplats["form"], string][] = [
   ["compressed.ply", ".compressed.ply: PlayCanvas"],
   ["splat", ".splat: no view-dependent colour"],
   ["glb", ".glb: glTF"],
+  ["usda", ".usda: USD text, largest"],
+  ["usdc", ".usdc: USD, with usd-core"],
+  ["usdz", ".usdz: USD package, with usd-core"],
 ];
 
 export interface Dialogs {

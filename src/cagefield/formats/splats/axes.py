@@ -9,12 +9,15 @@ Source: nianticlabs/spz, src/cc/splat-types.h (CoordinateConverter).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
 
 from cagefield.fields import sh as spherical_harmonics
-from cagefield.formats.splats.splat_table import SplatBatch
+from cagefield.fields.splat_field import Offset
+from cagefield.formats.splats.splat_table import SplatBatch, SplatTable
 from cagefield.typing import Array
 
 Axes = Literal["rdf", "rub", "luf", "ruf", "ldb", "rdb", "ldf", "lub"]
@@ -51,3 +54,39 @@ def _harmonic_signs(count: int, flip: Array) -> Array:
     return np.sign(
         spherical_harmonics.sh_basis(d * flip, degree)[0] * spherical_harmonics.sh_basis(d, degree)[0]
     )
+
+
+@dataclass(frozen=True, eq=False)
+class ConvertedTable:
+    """Table in a format's axes, with harmonics of the format's degree at most."""
+
+    table: SplatTable
+    axes: str
+    sh_degree: int
+
+    @property
+    def count(self) -> int:
+        return self.table.count
+
+    @property
+    def antialiased(self) -> bool:
+        return self.table.antialiased
+
+    @property
+    def discs(self) -> bool:
+        return self.table.discs
+
+    @property
+    def offset(self) -> Offset:
+        x, y, z = (axis_signs(PLY_AXES, self.axes) * np.array(self.table.offset) + 0.0).tolist()
+        return x, y, z
+
+    def batches(self) -> Iterator[SplatBatch]:
+        return (self._of(batch) for batch in self.table.batches())
+
+    def sorted_batches(self) -> Iterator[SplatBatch]:
+        return (self._of(batch) for batch in self.table.sorted_batches())
+
+    def _of(self, batch: SplatBatch) -> SplatBatch:
+        coefficients = replace(batch, sh=batch.sh[:, : (self.sh_degree + 1) ** 2])
+        return convert_axes(coefficients, PLY_AXES, self.axes)

@@ -30,8 +30,6 @@ _OTHER_TYPES = (
     (b"RIFF", "a WebP picture or another RIFF file"),
     (b"\x93NUMPY", "a NumPy array"),
     (b"\x89HDF", "an HDF5 file"),
-    (b"PXR-USDC", "a USD file"),
-    (b"#usda", "a USD file"),
     (b"Kaydara FBX", "an FBX mesh"),
     (b"solid ", "an STL mesh"),
     (b"OFF", "an OFF mesh"),
@@ -63,6 +61,8 @@ def detect_format(path: Path) -> str | None:
         return ".glb"
     if start.startswith(b"NGSP") or _gzip_start(path, start) == b"NGSP":
         return ".spz"
+    if start.startswith((b"#usda", b"PXR-USDC")):
+        return ".usda" if start.startswith(b"#usda") else ".usdc"
     if start.startswith(b"PK\x03\x04"):
         return _zip_format(path)
     if start.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{"):
@@ -110,11 +110,14 @@ def _gzip_start(path: Path, start: bytes) -> bytes:
 def _zip_format(path: Path) -> str | None:
     try:
         with zipfile.ZipFile(path) as archive:
-            names = {PurePosixPath(name).name for name in archive.namelist()}
+            files = archive.namelist()
+            names = {PurePosixPath(name).name for name in files}
     except (zipfile.BadZipFile, NotImplementedError, ValueError, OSError):
         return None
     if LOD_META in names:
         return ".zip of " + LOD_META
+    if files and files[0].lower().endswith((".usd", ".usda", ".usdc")):
+        return ".usdz"
     return ".sog" if META in names else None
 
 

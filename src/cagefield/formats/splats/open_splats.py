@@ -10,6 +10,7 @@
 | .splat | antimatter15 | yes | yes |
 | .ksplat | mkkellogg | yes | no |
 | .glb, .gltf | KHR_gaussian_splatting | yes | .glb |
+| .usda, .usdc, .usdz, .usd | OpenUSD, with usd-core | yes | yes, .usda without usd-core |
 | .ckpt | nerfstudio's splatfacto | yes | no |
 """
 
@@ -34,9 +35,11 @@ from cagefield.formats.splats.sog_lod import open_sog_lod
 from cagefield.formats.splats.splat_ply import MESH, POINT_CLOUD_CURE, open_splat_ply
 from cagefield.formats.splats.splat_table import SplatSource
 from cagefield.formats.splats.spz import open_spz
+from cagefield.formats.splats.usd import open_splat_usd
 
 READABLE = (
     *(".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".ksplat", ".glb", ".gltf", ".ckpt"),
+    *(".usda", ".usdc", ".usdz", ".usd"),
     *(META, LOD_META),
 )
 
@@ -45,8 +48,14 @@ _CLOUDS = ("a LAS point cloud", "a PCD point cloud")
 _NAMES = {
     ".ply": "a PLY", ".spz": "an SPZ", ".sog": "a SOG", ".ksplat": "a .ksplat", ".glb": "a binary glTF",
     ".gltf": "a glTF", META: "a SOG's meta.json", LOD_META: "a streamed SOG's lod-meta.json",
+    ".usda": "a USD text", ".usdc": "a binary USD", ".usdz": "a USD package",
 }  # fmt: skip
-_ALSO_VALID_SUFFIXES = {META: (META, ".json"), LOD_META: (LOD_META, META, ".json")}
+_ALSO_VALID_SUFFIXES = {
+    META: (META, ".json"),
+    LOD_META: (LOD_META, META, ".json"),
+    ".usda": (".usd",),
+    ".usdc": (".usd",),
+}
 
 
 def _open_any_ply(path: Path) -> SplatSource:
@@ -67,6 +76,10 @@ _OPEN: dict[str, Callable[[Path], SplatSource]] = {
     ".glb": open_splat_gltf,
     ".gltf": open_splat_gltf,
     ".ckpt": open_splatfacto,
+    ".usda": open_splat_usd,
+    ".usdc": open_splat_usd,
+    ".usdz": open_splat_usd,
+    ".usd": open_splat_usd,
 }
 
 
@@ -78,10 +91,10 @@ def format_suffix(path: Path) -> str:
     return max((ending for ending in READABLE if name.endswith(ending)), key=len, default="")
 
 
-def open_splats(path: Path) -> SplatSource:
+def open_splats(path: Path, time_code: float | None = None) -> SplatSource:
     """Open splat file; values are read batch by batch.
 
-    A warning names a content of another format than the suffix.
+    `time_code` is one of a USD file. A warning names a content of another format than the suffix.
 
     Raises:
         FieldError: missing file, unknown format, or a damaged file.
@@ -102,6 +115,10 @@ def open_splats(path: Path) -> SplatSource:
     if not path.is_dir() and not path.name.lower().endswith((found, *_ALSO_VALID_SUFFIXES.get(found, ()))):
         said = f"not what its name says ({ending})" if ending else "which its name does not say"
         warnings.warn(f"{path}: its content is {_NAMES[found]}, {said}; it is read as that", stacklevel=2)
+    if time_code is not None:
+        if _OPEN[found] is not open_splat_usd:
+            raise FieldError(f"{path}: time codes are USD's; leave --time-code out")
+        return open_splat_usd(path, time_code)
     return _OPEN[found](path)
 
 

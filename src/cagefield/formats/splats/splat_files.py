@@ -17,7 +17,7 @@ from cagefield.fields import sh as spherical_harmonics
 from cagefield.fields.splat_field import NO_OFFSET, Offset, SplatField
 from cagefield.files.memory import memory_shortage
 from cagefield.formats.splats.antimatter15_splat import write_splat_rows
-from cagefield.formats.splats.axes import PLY_AXES, Axes, axis_signs, convert_axes
+from cagefield.formats.splats.axes import PLY_AXES, Axes, ConvertedTable, convert_axes
 from cagefield.formats.splats.compressed_ply import write_compressed_ply
 from cagefield.formats.splats.gltf import GLTF_AXES
 from cagefield.formats.splats.gltf_writer import write_splat_gltf
@@ -37,8 +37,10 @@ from cagefield.formats.splats.splat_table import (
 from cagefield.formats.splats.spz import SPZ_AXES
 from cagefield.formats.splats.spz_writer import Version as SpzVersion
 from cagefield.formats.splats.spz_writer import write_spz
+from cagefield.formats.splats.usd_stage import USD_AXES
+from cagefield.formats.splats.usd_writer import USD_SUFFIXES, check_usd, write_splat_usd
 
-WRITABLE = (".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".glb")
+WRITABLE = (".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".glb", *USD_SUFFIXES)
 
 _WRITE: dict[str, tuple[Callable[[Path, SplatTable, OnProgress], None], Axes]] = {
     ".ply": (write_splat_ply, PLY_AXES),
@@ -47,9 +49,10 @@ _WRITE: dict[str, tuple[Callable[[Path, SplatTable, OnProgress], None], Axes]] =
     ".sog": (write_sog, PLY_AXES),
     ".splat": (write_splat_rows, PLY_AXES),
     ".glb": (write_splat_gltf, GLTF_AXES),
+    **dict.fromkeys(USD_SUFFIXES, (write_splat_usd, USD_AXES)),
 }
 
-_OFFSET_SUFFIXES = (".ply", ".glb")
+_OFFSET_SUFFIXES = (".ply", ".glb", *USD_SUFFIXES)
 """Formats with coordinates or a translation in double precision."""
 
 MAX_ROUNDING_SIZES = 0.01
@@ -60,22 +63,27 @@ _MAX_SH_DEGREE = {".compressed.ply": 3, ".sog": 3, ".glb": 3, ".splat": 0}
 
 
 def read_splats(
-    path: str | Path, axes: Axes | None = None, on_progress: OnProgress = lambda _: None
+    path: str | Path,
+    axes: Axes | None = None,
+    on_progress: OnProgress = lambda _: None,
+    *,
+    time_code: float | None = None,
 ) -> SplatField:
     """SplatField of a splat file, in PLY's axes (x right, y down, z forward).
 
-    `axes` replaces the axes that the file or its format states. Splats with non-finite values are left out,
+    `axes` replaces the axes that the file or its format states. `time_code` is one of a USD file's, else its
+    first. Splats with non-finite values are left out,
     with one warning.
 
     Raises:
         FieldError: missing file, unknown format, or a damaged file or one without visible splats.
     """
-    return read_source(open_within_memory(Path(path)), axes, on_progress)
+    return read_source(open_within_memory(Path(path), time_code), axes, on_progress)
 
 
-def open_within_memory(path: Path) -> SplatSource:
+def open_within_memory(path: Path, time_code: float | None = None) -> SplatSource:
     """Open splat file. Raises FieldError as `open_splats`, and for splats that exceed the memory."""
-    source = open_splats(path)
+    source = open_splats(path, time_code)
     needed = 4 * source.count * sum(map(math.prod, _shapes(source)))
     if (lacking := memory_shortage(needed)) is not None:
         raise FieldError(f"{path}: its {source.count} splats are too many: {lacking}")
@@ -172,6 +180,8 @@ def find_writer(
         FieldError: a format without writer, or a .spz version for another format.
     """
     ending = format_suffix(path)
+    if ending in USD_SUFFIXES:
+        check_usd(path)
     if ending not in _WRITE:
         raise FieldError(f"{path}: no format of splats that is written; these are: {', '.join(WRITABLE)}")
     if spz_version is None:
@@ -237,7 +247,7 @@ def _shift_to_origin(
     warnings.warn(
         f"{source.path}: its coordinates are far from the origin; "
         f"{_format_offset((x, y, z))} is taken off, kept, "
-        "and added where a .ply or .glb is exported",
+        "and added where a .ply, .glb or USD is exported",
         stacklevel=3,
     )
     shifted = (
@@ -259,6 +269,8 @@ def _write(
 ) -> int:
     """Write the splats; returns the degree of the written harmonics."""
     write, format_axes = find_writer(path, spz_version)
+    if format_suffix(path) in USD_SUFFIXES and axes not in (None, USD_AXES):
+        raise FieldError(f"{path}: USD has y up and is written in the axes {USD_AXES}; leave other axes out")
     degree = min(table.sh_degree, _MAX_SH_DEGREE.get(format_suffix(path), table.sh_degree))
     if degree < table.sh_degree:
         warnings.warn(
@@ -274,44 +286,8 @@ def _write(
     if any(table.offset) and format_suffix(path) not in _OFFSET_SUFFIXES:
         warnings.warn(
             f"{path}: {format_suffix(path)} holds coordinates as float32: they are without the offset "
-            f"{_format_offset(table.offset)}, in PLY's axes; .ply and .glb have it",
+            f"{_format_offset(table.offset)}, in PLY's axes; .ply, .glb and USD have it",
             stacklevel=3,
         )
-    write(path, _ConvertedTable(table, axes or format_axes, degree), on_progress)
+    write(path, ConvertedTable(table, axes or format_axes, degree), on_progress)
     return degree
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class _ConvertedTable:
-    """Table in a format's axes, with harmonics of the format's degree."""
-
-    table: SplatTable
-    axes: str
-    sh_degree: int
-
-    @property
-    def count(self) -> int:
-        return self.table.count
-
-    @property
-    def antialiased(self) -> bool:
-        return self.table.antialiased
-
-    @property
-    def discs(self) -> bool:
-        return self.table.discs
-
-    @property
-    def offset(self) -> Offset:
-        x, y, z = (axis_signs(PLY_AXES, self.axes) * np.array(self.table.offset) + 0.0).tolist()
-        return x, y, z
-
-    def batches(self) -> Iterator[SplatBatch]:
-        return (self._of(batch) for batch in self.table.batches())
-
-    def sorted_batches(self) -> Iterator[SplatBatch]:
-        return (self._of(batch) for batch in self.table.sorted_batches())
-
-    def _of(self, batch: SplatBatch) -> SplatBatch:
-        coefficients = dataclasses.replace(batch, sh=batch.sh[:, : (self.sh_degree + 1) ** 2])
-        return convert_axes(coefficients, PLY_AXES, self.axes)

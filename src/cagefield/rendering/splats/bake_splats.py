@@ -13,6 +13,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cagefield.edits import EditMap
 from cagefield.fields.sh_rotation import rotate_sh_each
@@ -34,22 +35,35 @@ def baked_splats(
     Raises:
         EditError: an edit that cannot be evaluated.
     """
+    return baked_set(splats, edits, preserve_opacity=preserve_opacity, split=split).field
+
+
+def baked_set(
+    splats: SplatField | SplatSet, edits: EditMap, *, preserve_opacity: bool = True, split: bool = True
+) -> SplatSet:
+    """`baked_splats` with their provenance: `origins` says which paste each is from, -1 for the scene's own.
+
+    Its splats are in deformed space, pasted ones too. Raises as `baked_splats`.
+    """
     splats = SplatSet.from_field(splats).with_pastes(edits)
     field = splats.field
     if not edits.steps:
-        return field
+        return splats
     moved = moved_splats(splats, edits)
-    parts = []
+    parts, origins = [], []
     found = split_of(splats, edits) if split else None
     if found is not None:
         moved = moved.without(found.parents)
-        parts.append(_baked(found.children.field, moved_splats(found.children, edits), preserve_opacity))
+        children = moved_splats(found.children, edits)
+        parts.append(_baked(found.children.field, children, preserve_opacity))
+        origins.append(_origins(found.children, children))
     parts.insert(0, _baked(field, moved, preserve_opacity))
+    origins.insert(0, _origins(splats, moved))
     boxes = np.concatenate([field.bounds[None], *(step.boxes for step in edits.steps)])
     means, log_scales, quaternions, opacities, sh = (
         np.concatenate([part[n] for part in parts]) for n in range(5)
     )
-    return dataclasses.replace(
+    baked = dataclasses.replace(
         field,
         means=means,
         log_scales=log_scales,
@@ -58,6 +72,12 @@ def baked_splats(
         sh=sh,
         bounds=np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)]),
     )
+    return SplatSet(baked, baked, np.concatenate(origins), splats.parts)
+
+
+def _origins(splats: SplatSet, moved: MovedSplats) -> NDArray[np.int32]:
+    """Origins of the rows of `_baked`."""
+    return np.concatenate([splats.origins[~moved.left], splats.origins[moved.source]])
 
 
 def where_they_are(field: SplatField, moved: MovedSplats, preserve_opacity: bool = True) -> SplatField:

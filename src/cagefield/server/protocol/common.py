@@ -40,7 +40,7 @@ InterpolationName: TypeAlias = Literal["linear", "bspline"]
 FillName: TypeAlias = Literal["surroundings", "none"]
 RelightName: TypeAlias = Literal["occlusion", "shadow", "none"]
 JobKind: TypeAlias = Literal["test_views", "camera_path"]
-SplatForm: TypeAlias = Literal["ply", "compressed.ply", "spz", "sog", "splat", "glb"]
+SplatForm: TypeAlias = Literal["ply", "compressed.ply", "spz", "sog", "splat", "glb", "usda", "usdc", "usdz"]
 Level: TypeAlias = Literal["info", "warning", "error"]
 
 Corner: TypeAlias = Annotated[int, Field(ge=0, le=7)]
