@@ -86,9 +86,10 @@ def test_a_child_is_drawn_and_dragged_where_its_parent_carries_it(
     now = corner(editor, finger["id"], 7)
     np.testing.assert_allclose(now, [carried["x"], carried["y"]], atol=0.5)
     assert np.linalg.norm(now - at_rest) > 20
-    with editor_page(server.link) as other:
-        other.ready()
-        assert other.edits == editor.edits, "the other page has the chain"
+    other = editor.tab(server.link)
+    other.ready()
+    assert other.edits == editor.edits, "the other page has the chain"
+    other.page.close()
     # A drag to the right, x in the picture, is +z of the finger at rest.
     editor.tools(tool="select")
     editor.drag(tuple(now), (12, 0))

@@ -36,7 +36,7 @@ def test_edit_files(page: str) -> None:
 def test_edit_files_show_every_kind_of_edit() -> None:
     (readme,) = blocks("README.md", "yaml")
     assert [edit.name for edit in parse_edits(readme)] == ["raise the arm"]
-    text, points, lattice, _, moved = blocks("docs/how-to/edit-files.md", "yaml")
+    text, points, lattice, chain, _, moved = blocks("docs/how-to/edit-files.md", "yaml")
     edits = parse_edits(text)
     assert [edit.name for edit in edits] == ["raise the arm", "a second cone", "no beacon"]
     assert isinstance(edits[1], Copy) and isinstance(edits[2], Delete)
@@ -45,6 +45,7 @@ def test_edit_files_show_every_kind_of_edit() -> None:
     (nose,), (arm,) = (parse_edits(f"version: 1\n{snippet}") for snippet in (points, lattice))
     assert isinstance(nose.inner, ControlPoints) and isinstance(arm.inner, LatticeCage)
     assert nose.is_possible and arm.is_possible
+    assert [edit.parent for edit in parse_edits(f"version: 1\n{chain}")] == ["", "arm"]
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/how-to/python.md"])

@@ -134,7 +134,8 @@ def test_visibility_keeps_its_images_where_it_is_cancelled(
         patcher.warm(cancelled_after(10))
     assert 0 < len(rendered) < 28
     patcher.warm()
-    assert len(rendered) == 28 and not patcher._images
+    # The picture that was cancelled in its middle is rendered again.
+    assert 28 <= len(rendered) <= 29 and not patcher._images
 
 
 @pytest.mark.parametrize(

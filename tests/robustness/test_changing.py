@@ -191,7 +191,7 @@ def test_an_editor_reads_what_the_one_before_it_saved(
     file = tmp_path / ".scene.cagefield-lock"
     held: list[bool] = []
 
-    def opens(path: Path) -> Scene:
+    def opens(path: Path, **_: object) -> Scene:
         held.append(file.exists())
         raise SceneError("enough")
 

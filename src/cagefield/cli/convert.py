@@ -62,7 +62,7 @@ class Convert:
         self._print(count, degree)
 
     def _decimate(self, count: int) -> None:
-        """Write at most `count` splats, and print what their pictures lose."""
+        """Write at most `count` splats, and print the loss of their pictures."""
         from cagefield.fields.splat_decimation import decimate_splats
         from cagefield.formats.splats.splat_files import read_splats, write_splats
         from cagefield.rendering.splats.decimation_loss import VIEWS, decimation_loss

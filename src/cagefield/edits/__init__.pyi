@@ -1,3 +1,4 @@
+from .chains import resolved_edits as resolved_edits
 from .edit import Continuous as Continuous
 from .edit import Copy as Copy
 from .edit import Delete as Delete

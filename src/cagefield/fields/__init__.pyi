@@ -3,6 +3,15 @@ from .analytic import GaussianBlob as GaussianBlob
 from .analytic import UniformBox as UniformBox
 from .analytic import UniformSphere as UniformSphere
 from .baking import bake as bake
+from .external.external_field import ExternalField as ExternalField
+from .external.hash_grid import HashGrid as HashGrid
+from .external.hash_network import HashNetwork as HashNetwork
+from .external.instant_ngp import InstantNgpField as InstantNgpField
+from .external.nerfacto import NerfactoField as NerfactoField
+from .external.plenoctree import PlenOctreeField as PlenOctreeField
+from .external.tensorf import TensorfField as TensorfField
+from .external.tensorf_parameters import TensorfParameters as TensorfParameters
+from .external.torch_field import TorchField as TorchField
 from .nerf_field import NerfField as NerfField
 from .protocol import Field as Field
 from .splat_decimation import decimate_splats as decimate_splats

@@ -32,7 +32,7 @@ from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.quaternions import quaternions_from_matrices, rotation_matrices
 from cagefield.typing import Array
 
-NEIGHBORS = 6
+MERGE_CANDIDATES = 6
 """Nearest splats with which one may merge."""
 
 BLUR_SPACINGS = 0.5
@@ -41,7 +41,7 @@ BLUR_SPACINGS = 0.5
 ROUND_SHARE = 0.125
 """Share of the splats by which a round makes them fewer: smaller shares find better partners."""
 
-MAX_OPACITY = 0.999
+MAX_MERGED_OPACITY = 0.999
 """Maximum opacity of a merged splat."""
 
 
@@ -115,7 +115,7 @@ def _fewer(splats: _Splats, count: int, blur: float) -> _Splats:
     from cagefield.fields.kernels import splat_decimation as kernels
 
     number = len(splats.means)
-    _, near = cKDTree(splats.means).query(splats.means, k=min(NEIGHBORS + 1, number), workers=-1)
+    _, near = cKDTree(splats.means).query(splats.means, k=min(MERGE_CANDIDATES + 1, number), workers=-1)
     near = np.ascontiguousarray(near[:, 1:])
     costs, own = merge_costs(splats, near, blur)
     every = np.concatenate([costs.reshape(-1), own])
@@ -152,7 +152,7 @@ def merge_costs(splats: _Splats, near: NDArray[np.int64], blur: float) -> tuple[
         own,
         near,
         blur,
-        MAX_DEPTH,
+        MAX_OPTICAL_DEPTH,
         costs,
     )
     return costs, own
@@ -181,8 +181,8 @@ def merge(splats: _Splats, first: NDArray[np.int64], second: NDArray[np.int64]) 
 
 
 def dilogarithm(opacities: Array) -> Array:
-    """Li2 [N] of opacities [N], of at most MAX_OPACITY."""
-    return np.asarray(spence(1.0 - np.minimum(opacities, MAX_OPACITY)))
+    """Li2 [N] of opacities [N], of at most MAX_MERGED_OPACITY."""
+    return np.asarray(spence(1.0 - np.minimum(opacities, MAX_MERGED_OPACITY)))
 
 
 def _areas(covariances: Array) -> Array:
@@ -225,10 +225,10 @@ def _field_of(splats: _Splats, field: SplatField) -> SplatField:
 _UPPER = np.array([0, 1, 2, 4, 5, 8])
 _FULL = np.array([0, 1, 2, 1, 3, 4, 2, 4, 5])
 _IDENTITY = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
-MAX_DEPTH = float(dilogarithm(np.array([1.0]))[0])
-"""Li2 of MAX_OPACITY."""
-_DEPTHS = np.linspace(0.0, MAX_DEPTH, 4096)
-_FINE = np.linspace(0.0, MAX_OPACITY, 65536)
+MAX_OPTICAL_DEPTH = float(dilogarithm(np.array([1.0]))[0])
+"""Li2 of MAX_MERGED_OPACITY."""
+_DEPTHS = np.linspace(0.0, MAX_OPTICAL_DEPTH, 4096)
+_FINE = np.linspace(0.0, MAX_MERGED_OPACITY, 65536)
 _OPACITIES = np.interp(_DEPTHS, dilogarithm(_FINE), _FINE)
 _BLOCK = 1 << 16
 """Splats whose covariances are computed at a time."""

@@ -1,6 +1,6 @@
 """MessagePack of untrusted files: maps, lists, text, numbers, and binaries as views of the bytes.
 
-Lengths that exceed what is left of the bytes, deep nesting and too many values are refused before anything is
+Lengths beyond the rest of the bytes, deep nesting and too many values are refused before anything is
 allocated. Extension types are binaries without their type.
 
 Source: github.com/msgpack/msgpack, spec.md.
@@ -11,8 +11,8 @@ from __future__ import annotations
 import struct
 from typing import Any
 
-MAX_NESTING = 32
-MAX_VALUES = 4_000_000
+MAX_MSGPACK_NESTING = 32
+MAX_MSGPACK_VALUES = 4_000_000
 """Number of values of a file: seconds to be read."""
 
 _NUMBERS = {
@@ -61,9 +61,9 @@ class _Reader:
 
     def value(self, depth: int) -> Any:
         self.count += 1
-        if self.count > MAX_VALUES:
-            raise ValueError(f"it has more than {MAX_VALUES} values")
-        if depth > MAX_NESTING:
+        if self.count > MAX_MSGPACK_VALUES:
+            raise ValueError(f"it has more than {MAX_MSGPACK_VALUES} values")
+        if depth > MAX_MSGPACK_NESTING:
             raise ValueError("it is nested too deeply")
         first = self.take(1)[0]
         if first <= 0x7F or first >= 0xE0:

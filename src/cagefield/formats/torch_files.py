@@ -67,7 +67,7 @@ def read_torch_tensors(path: Path) -> dict[str, Any]:
 
 
 def _numpy_globals() -> list[Any]:
-    """NumPy's names in pickles, of versions 1 and 2, with what they stand for here."""
+    """NumPy's names in pickles, of versions 1 and 2, with their meaning here."""
     found: list[Any] = [np.ndarray, np.dtype]
     found += [type(np.dtype(kind)) for kind in ("?", *np.typecodes["AllInteger"], *np.typecodes["Float"])]
     for module in ("numpy.core.multiarray", "numpy._core.multiarray"):

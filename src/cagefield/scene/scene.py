@@ -106,7 +106,7 @@ class Scene:
     opened from: sources of pastes are relative to that, or to the working directory where it is None.
     `source_to_world` [4,4] maps the coordinates of the reconstruction that the cameras came from to the
     scene's (`Dataset.source_to_world`); the identity where they are the same or nothing is known.
-    `removal` has the whole field, which is what is saved, where `field` is without deleted elements.
+    `removal` has the whole field, which is saved, where `field` is without deleted elements.
 
     Raises:
         CagefieldError: a background outside [0, 1].

@@ -27,7 +27,7 @@ from cagefield.errors import FieldError
 from cagefield.fields.external.external_field import frozen_array, number, whole_number
 from cagefield.typing import Float32
 
-LAYOUTS = ("tcnn", "torch")
+HASH_GRID_LAYOUTS = ("tcnn", "torch")
 MAX_DENSE_RESOLUTION = 0x659
 """Maximum resolution whose cube fits 32 bits; finer levels of tcnn are hashed."""
 
@@ -43,7 +43,7 @@ class HashGrid:
 
     Attributes:
         table: [entries of all levels, F] float32, level after level.
-        layout: one of LAYOUTS.
+        layout: one of HASH_GRID_LAYOUTS.
         levels: number of levels. base: resolution N of the coarsest. growth: factor b between levels.
         log2_size: binary logarithm of the maximum number of entries of a level.
 
@@ -62,7 +62,7 @@ class HashGrid:
         def fix(name: str, value: Any) -> None:
             object.__setattr__(self, name, value)
 
-        if self.layout not in LAYOUTS:
+        if self.layout not in HASH_GRID_LAYOUTS:
             raise FieldError(f"layout of the hash grid is {self.layout!r:.40}; expected tcnn or torch")
         fix("levels", whole_number("number of levels", self.levels, 1, 128))
         fix("base", whole_number("base resolution", self.base, 1, 1 << 16))

@@ -17,7 +17,7 @@ from cagefield.typing import Float32
 Layers = tuple[tuple[Float32, Float32], ...]
 """(weight [out,in], bias [out]) of each layer, with ReLU between them."""
 
-MAX_LAYERS = 64
+MAX_NETWORK_LAYERS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +63,8 @@ def checked_layers(name: str, layers: Any, inputs: int, outputs: int | None = No
     Raises:
         FieldError: shapes that do not fit each other.
     """
-    if not 1 <= len(layers) <= MAX_LAYERS:
-        raise FieldError(f"a network must have 1 to {MAX_LAYERS} layers, got {len(layers)}")
+    if not 1 <= len(layers) <= MAX_NETWORK_LAYERS:
+        raise FieldError(f"a network must have 1 to {MAX_NETWORK_LAYERS} layers, got {len(layers)}")
     found = []
     for index, (weight, bias) in enumerate(layers):
         rows = outputs if index == len(layers) - 1 else None

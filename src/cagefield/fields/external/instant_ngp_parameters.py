@@ -14,7 +14,7 @@ Occupancy: cascade c covers the cube of edge 2^c around 1/2 with 128^3 cells; a 
 cascade whose cube holds it. sigma is 0 where its cell is empty, and outside the crop box.
 
 Rays: lattice of step lengths STEP for a cube of edge 1, else STEP, growing with t / 256 up to 1024 STEP
-(units of q); samples at the lattice's points, which is what skipping of empty cells leaves of them.
+(units of q); samples at points of the lattice, less those that lie in empty cells.
 
 Source: Mueller et al., "Instant Neural Graphics Primitives" (2022), section 5.4 and appendix E; layout and
 sampling of github.com/NVlabs/instant-ngp, nerf_device.cuh and testbed_nerf.cu.

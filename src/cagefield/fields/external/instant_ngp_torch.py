@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 CONE = 1.0 / 256.0
 """Growth of the step with the distance, for cubes of an edge above 1."""
 LONGEST_STEP = 1024.0 * STEP
-MAX_SAMPLES = 1 << 14
+MAX_NGP_SAMPLES = 1 << 14
 """Maximum number of samples on a ray; a cube of edge 128 has about 2,500."""
 MAX_EXPONENT = 10.0
 """Exponential colors are exp of at most this."""
@@ -83,7 +83,7 @@ class TorchInstantNgp(TorchField):
         hit = leave > enter.clamp_min(NEAR / scale)
         end = self._steps.of_distance(scale * torch.where(hit, leave, enter).clamp_min(0.0))
         longest = torch.where(hit, end - start, torch.zeros_like(end)).max()
-        count = min(MAX_SAMPLES, max(1, int(torch.ceil(longest).item()) + 1))
+        count = min(MAX_NGP_SAMPLES, max(1, int(torch.ceil(longest).item()) + 1))
         n = start[:, None] + torch.arange(count + 1, device=self.device, dtype=start.dtype)
         t = self._steps.distance(n) / scale
         return RaySamples(t[:, :-1].float(), (t[:, 1:] - t[:, :-1]).float())

@@ -45,7 +45,7 @@ from cagefield.fields.external.hash_network import (
 SPACINGS = ("piecewise", "uniform")
 DIRECTION_TERMS = 16
 """Number of spherical harmonics of degree 3."""
-MAX_SAMPLES = 1 << 14
+MAX_NERFACTO_SAMPLES = 1 << 14
 """Maximum number of samples on a ray in one round."""
 
 _OPTIONS = ("contracted", "density_scale", "far", "samples", "spacing", "endless")
@@ -99,7 +99,10 @@ class NerfactoParameters(ExternalField):
             raise FieldError("the networks must have one layout, got torch and tcnn")
         if not isinstance(self.samples, (tuple, list)) or not 1 <= len(self.samples) <= 16:
             raise FieldError(f"samples must be numbers of samples of each round, got {self.samples!r:.60}")
-        fix("samples", tuple(whole_number("number of samples", n, 1, MAX_SAMPLES) for n in self.samples))
+        fix(
+            "samples",
+            tuple(whole_number("number of samples", n, 1, MAX_NERFACTO_SAMPLES) for n in self.samples),
+        )
         if len(self.samples) > 1 and not self.proposals:
             raise FieldError(f"samples are {list(self.samples)}, but there is no proposal network")
         fix("density_scale", number("average_init_density", self.density_scale, 1e-12, 1e12))

@@ -13,7 +13,7 @@ from cagefield.fields.external.torch_field import DensityAt, RaySamples, TorchFi
 if TYPE_CHECKING:
     from cagefield.fields.external.nerfacto_parameters import NerfactoParameters
 
-ENDLESS = 1e20
+ENDLESS_SEGMENT = 1e20
 """Length of the last sample's segment where it absorbs all that is left."""
 
 HISTOGRAM_PADDING = 0.01
@@ -70,7 +70,7 @@ class TorchNerfacto(TorchField):
         edges = self._distance(bins)
         t, delta = 0.5 * (edges[:, 1:] + edges[:, :-1]), edges[:, 1:] - edges[:, :-1]
         if self.field.endless:
-            delta = torch.cat([delta[:, :-1], torch.full_like(delta[:, :1], ENDLESS)], dim=1)
+            delta = torch.cat([delta[:, :-1], torch.full_like(delta[:, :1], ENDLESS_SEGMENT)], dim=1)
         return RaySamples(t, delta)
 
     def _proposed(self, network: TorchHashNetwork, positions: Tensor) -> Tensor:

@@ -28,7 +28,7 @@ from cagefield.fields.external.external_field import ExternalField, frozen_array
 if TYPE_CHECKING:
     from cagefield.fields.external.torch_field import TorchField
 
-MAX_DEPTH = 12
+MAX_TREE_LEVELS = 12
 """Maximum depth of a tree: 4,096 leaves along an edge; the authors' largest have 9 or 10."""
 
 
@@ -79,8 +79,8 @@ class PlenOctreeField(ExternalField):
         nodes, depth = np.zeros(1, np.int64), 0
         while len(nodes):
             depth += 1
-            if depth > MAX_DEPTH:
-                raise FieldError(f"the tree has more than {MAX_DEPTH} levels; it may be damaged")
+            if depth > MAX_TREE_LEVELS:
+                raise FieldError(f"the tree has more than {MAX_TREE_LEVELS} levels; it may be damaged")
             visited[nodes] = True
             steps = flat[nodes]
             children = (nodes[:, None] + steps)[steps != 0]

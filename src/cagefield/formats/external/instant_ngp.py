@@ -115,10 +115,11 @@ def read_instant_ngp(path: Path) -> ExternalCheckpoint:
 def _unpacked(path: Path) -> Any:
     """The value of the file, unpacked in bounded memory."""
     try:
-        if (lacking := memory_shortage(2 * check_regular(path, MAX_BYTES))) is not None:
+        size = check_regular(path, MAX_BYTES)
+        if (lacking := memory_shortage(2 * size)) is not None:
             raise FieldError(lacking)
         with open_regular(path) as file:
-            content = file.read(MAX_BYTES)
+            content = file.read(size)
     except UnreadableError as error:
         raise FieldError(f"{error}") from None
     except OSError as error:

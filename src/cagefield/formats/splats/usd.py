@@ -27,7 +27,7 @@ from cagefield.formats.splats.usd_library import import_usd, message_of, quiet_u
 from cagefield.formats.splats.usd_stage import PRIM_TYPE, SH_COEFFICIENTS, SH_DEGREE, USD_AXES
 from cagefield.typing import AnyArray, Array
 
-MAX_LAYERS = 200
+MAX_USD_LAYERS = 200
 """Maximum number of files of a stage."""
 
 MAX_SPLATS = 1 << 31
@@ -170,8 +170,8 @@ def _check_references(usd: Any, path: Path, layer: Any) -> None:
             file = real_path(folder / package)
             if not file.is_relative_to(folder):
                 raise FieldError(f"{path}: it refers to {asset!s:.80}, outside of its folder; flatten it")
-            if len(known) > MAX_LAYERS:
-                raise FieldError(f"{path}: it refers to more than {MAX_LAYERS} files; flatten it")
+            if len(known) > MAX_USD_LAYERS:
+                raise FieldError(f"{path}: it refers to more than {MAX_USD_LAYERS} files; flatten it")
             try:
                 check_regular(file)
             except OSError as error:

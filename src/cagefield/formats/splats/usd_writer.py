@@ -34,7 +34,7 @@ def write_usd_stage(
 
 
 def check_usd(path: Path) -> None:
-    """Pass where the suffix is one of USD and what writes it is installed; else raise FieldError."""
+    """Pass where the suffix is one of USD and its writer is installed; else raise FieldError."""
     suffix = path.suffix.lower()
     if suffix not in _WRITE:
         raise FieldError(f"{path}: USD is written as {', '.join(USD_SUFFIXES)}; give such a name")

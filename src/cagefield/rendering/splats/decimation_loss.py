@@ -12,7 +12,7 @@ from cagefield.rendering.splats.splat_renderer import SplatRenderer
 VIEWS, SIZE_PX = 8, 400
 """Number of views on a circle, and their width and height."""
 
-FOV_X = 0.9
+VIEW_FOV_X = 0.9
 """Horizontal field of view, radians."""
 
 DISTANCE_RADII, ELEVATION = 2.5, 0.35
@@ -30,7 +30,7 @@ def decimation_loss(before: SplatField, after: SplatField) -> tuple[float, float
         elevation=ELEVATION,
         width=SIZE_PX,
         height=SIZE_PX,
-        fov_x=FOV_X,
+        fov_x=VIEW_FOV_X,
     )
     renderers = SplatRenderer(before), SplatRenderer(after)
     scores = []

@@ -13,7 +13,7 @@ from cagefield.errors import EditError
 from cagefield.server.editor.document import Document, Entry
 from cagefield.typing import Array
 
-MAX_CONDITION = 1e4
+MAX_CARRIER_CONDITION = 1e4
 """Condition of a carrier from which its inverse, which drags go through, is no use."""
 
 
@@ -92,7 +92,7 @@ class Carriers:
         self._problem = problem
         self._known: dict[int, tuple[tuple[Edit, ...], Array | None]] = {}
 
-    def of(self, document: Document, entry: Entry) -> Array | None:
+    def carrier(self, document: Document, entry: Entry) -> Array | None:
         """The affine map of a child's cages at rest to where its parents carry them; None without any.
 
         The least-squares fit to the carried corners of the inner cage, before and after its operations:
@@ -135,6 +135,6 @@ def _carrier(child: Edit, parents: Sequence[Edit]) -> Array | None:
     solution, _, rank, _ = np.linalg.lstsq(np.hstack([points[kept], ones]), there.points[kept], rcond=None)
     carrier = np.asarray(solution.T)
     linear = carrier[:, :3]
-    if rank < 4 or np.linalg.det(linear) <= 0.0 or np.linalg.cond(linear) > MAX_CONDITION:
+    if rank < 4 or np.linalg.det(linear) <= 0.0 or np.linalg.cond(linear) > MAX_CARRIER_CONDITION:
         return None
     return carrier

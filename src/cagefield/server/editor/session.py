@@ -121,7 +121,7 @@ class Session:
 
     def carrier(self, entry: Entry) -> Array | None:
         """Affine map [3,4] by which the parents of a shown entry carry its cages; None without any."""
-        return self._carriers.of(self.shown, entry)
+        return self._carriers.carrier(self.shown, entry)
 
     def below(self, number: int) -> tuple[Edit, ...]:
         """Drawn edits before edit `number`, which define the space of its inner cage."""

@@ -14,7 +14,7 @@ PointChange: TypeAlias = PlaceMesh | Subdivide | PointReach
 
 
 async def change_points(session: Session, page: Page, message: PointChange) -> None:
-    """Do what a message asks for. Raises `CagefieldError` for what is not possible."""
+    """Carry out a message. Raises `CagefieldError` where that is not possible."""
     if isinstance(message, PlaceMesh):
         cage, warning = await run_in_thread(lambda: decoded_mesh_cage(message.name, message.content))
         session.place_mesh(cage, message.name)
