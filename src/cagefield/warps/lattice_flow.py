@@ -48,7 +48,8 @@ class LatticeFlow:
     Chosen by measurement (`benchmarks/lattice_profiles.py` and three random lattices, 13 edits), geometric
     means of the least det J and the largest stretch around the lattice: 0.136 and 10.9; margin 0.7 0.086 and
     12.0, 1.4 0.105 and 15.4; slope at the outer cage 0.5 0.132 and 12.1, 0.95 0.134 and 10.6; 64 samples and
-    32 are alike. A grid of 24 cells and 8 steps at least are no better than 20 and 6; 4 steps leave nodes twice as far off.
+    32 are alike. A grid of 24 cells and 8 steps at least are no better than 20 and 6;
+    4 steps leave nodes twice as far off.
 
     Parameters: the pieces of the way, the outer cage, the falloff, the grid's cells along each axis.
     """
