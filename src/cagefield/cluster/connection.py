@@ -118,7 +118,7 @@ def _local_workers(count: int, security: Security | None) -> Iterator[LocalClust
     from distributed import LocalCluster
 
     # A kernel's launch holds the interpreter to its end: a busy worker may not answer for minutes.
-    settings = {"distributed.scheduler.worker-ttl": None}
+    settings = {"distributed.scheduler.worker-ttl": None, "distributed.comm.timeouts.connect": "120s"}
     with (
         TemporaryFolder("cluster") as scratch,
         dask.config.set(settings),

@@ -70,7 +70,7 @@ class FrameCluster:
         waiting = set(futures)
         futures.clear()  # a result is released once it is here
         try:
-            for future in as_completed(list(waiting)):
+            for future in as_completed(list(waiting), loop=self.client.loop):
                 name = names[future.key]
                 try:
                     result: FrameResult = future.result()
