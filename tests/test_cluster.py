@@ -51,10 +51,10 @@ def run(*argv: object) -> None:
 def test_frames_of_a_cluster_that_loses_a_worker_are_those_of_one_process(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Depth, before and after, an orbit of 6; a worker is killed once the first frame is there."""
+    """Depth, before and after, an orbit of 6; a worker is killed once two frames are there, amid others."""
     options = ["--turntable", 6, "--size", "32x24", "--depth", "--compare"]
     run("render", scene, "-o", tmp_path / "one", *options)
-    killed = kill_after(monkeypatch, frames=1, times=1)
+    killed = kill_after(monkeypatch, frames=2, times=1)
     run("render", scene, "-o", tmp_path / "many", *options, "--cluster", 2)
     assert len(killed) == 1
     expected = files_of(tmp_path / "one")
@@ -162,8 +162,9 @@ def test_another_scene_than_the_clients_is_not_rendered(scene: Path, tmp_path: P
 
 
 def test_a_scene_with_pastes_needs_a_shared_folder(scene: Path, tmp_path: Path) -> None:
+    ball_scene().save(tmp_path / "other")
     opened = Scene.open(scene)
-    pasting = opened.with_edits(opened.edits.append(opened.paste(scene)))
+    pasting = opened.with_edits(opened.edits.append(opened.paste(tmp_path / "other")))
     with pytest.raises(SceneError, match="pastes from other scenes"):
         SceneArchive.packed(SceneSource.read(scene), pasting)
 

@@ -126,6 +126,7 @@ def open_frame_cluster(
             client.register_plugin(ArchivePlugin(archive), name=archive.name)
             opened.callback(client.unregister_worker_plugin, archive.name)
         lost = _lost_workers(client)
+        opened.callback(client.unsubscribe_topic, "all")
         try:
             yield FrameCluster(client, job)
         finally:
