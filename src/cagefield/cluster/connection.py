@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from distributed import Client, LocalCluster
     from distributed.security import Security
 
-LOOPBACK = "127.0.0.1"
+LOCAL_WORKERS_HOST = "127.0.0.1"
 MAX_LOCAL_WORKERS = 256
 CONNECT_SECONDS = 30.0
 """Time that a scheduler and its first worker are waited for."""
@@ -109,7 +109,12 @@ def connect(cluster: int | str, tls: TlsFiles | None = None) -> Iterator[Client]
             target: Any = opened.enter_context(_local_workers(cluster, security))
         else:
             target = None
-        yield opened.enter_context(_client(cluster, target, security))
+        client = opened.enter_context(_client(cluster, target, security))
+        if target is not None:
+            from cagefield.cluster.worker_plugin import InterruptPlugin
+
+            client.register_plugin(InterruptPlugin())
+        yield client
 
 
 @contextmanager
@@ -126,7 +131,7 @@ def _local_workers(count: int, security: Security | None) -> Iterator[LocalClust
             n_workers=count,
             threads_per_worker=1,
             processes=True,
-            host=LOOPBACK,
+            host=LOCAL_WORKERS_HOST,
             dashboard_address=None,
             memory_limit=0,
             local_directory=str(scratch),

@@ -1,6 +1,9 @@
-"""dask's plugin of a `SceneArchive`."""
+"""Plugins of dask's workers: the files of a scene, and interrupts."""
 
 from __future__ import annotations
+
+import contextlib
+import signal
 
 from distributed import WorkerPlugin
 from distributed.worker import Worker
@@ -21,3 +24,14 @@ class ArchivePlugin(WorkerPlugin):  # type: ignore[misc]
     def teardown(self, worker: Worker) -> None:
         """Removes the unpacked scene."""
         self.archive.teardown()
+
+
+class InterruptPlugin(WorkerPlugin):  # type: ignore[misc]
+    """Ctrl+C left to the command, which ends its local workers: a terminal sends it to all of them."""
+
+    name = "cagefield-interrupts"
+
+    def setup(self, worker: Worker) -> None:
+        """Ignores SIGINT in the worker's process."""
+        with contextlib.suppress(ValueError):  # not the main thread
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
