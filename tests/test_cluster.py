@@ -67,7 +67,7 @@ def test_frames_of_a_cluster_that_loses_a_worker_are_those_of_one_process(
 def test_two_kills_among_three_workers(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    options = ["--turntable", 40, "--size", "200x160", "--exact", "--normals"]
+    options = ["--turntable", 24, "--size", "48x32", "--depth", "--normals", "--compare"]
     run("render", scene, "-o", tmp_path / "one", *options)
     killed = kill_after(monkeypatch, frames=5, times=2)
     run("render", scene, "-o", tmp_path / "many", *options, "--cluster", 3)
