@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,7 +22,8 @@ from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
     from cagefield.cameras.camera import Camera
-    from cagefield.cli.pictures import Pictures
+    from cagefield.cli.frame_files import FrameFiles
+    from cagefield.scene.frames import FrameOptions
     from cagefield.scene.scene import Scene
 
 
@@ -62,6 +62,16 @@ class Render:
     fps: float | None = None
     """Pictures a second in a video: 24, or the rate of the camera path."""
     device: Device = "auto"
+    frames: str | None = None
+    """FIRST-LAST: only these of all the pictures, numbered as among all; for arrays of jobs."""
+    keep: Flag = False
+    """Go on: pictures that are in the folder stay, the others are added. Of a video they are in NAME_frames.
+    Scene and options must be those of the first run; sizes are checked."""
+    cluster: str | None = None
+    """Render on a cluster of dask.distributed: a number of local workers, tcp://HOST:PORT, tls://HOST:PORT,
+    or a scheduler file."""
+    cluster_tls: tuple[Path, Path, Path] | None = None
+    """CA CERT KEY: PEM files for the connections to and in the cluster."""
     overwrite: Flag = False
     """Replace files that are there."""
 
@@ -69,37 +79,107 @@ class Render:
         """Renders and writes; prints where the result is."""
         self._check_options()
         video, single = self.out.suffix.lower() == ".mp4", self.out.suffix.lower() == ".png"
-        (check_file if video or single else check_folder)(self.out, self.overwrite)
+        if video or single:
+            check_file(self.out, self.overwrite)
+        else:
+            check_folder(self.out, self.overwrite or self.keep)
         if single:
             for end in ["_depth.png", "_depth.npy"] * self.depth + ["_normals.png"] * self.normals:
                 check_file(self.out.with_name(self.out.stem + end), self.overwrite)
 
-        from cagefield.cli.pictures import in_one_row, write_pictures
-        from cagefield.compute import devices
-        from cagefield.files.atomic import merged_folder
-        from cagefield.images.image_files import write_video
+        from cagefield.cli.frame_files import FrameFiles, parse_frames
+        from cagefield.images.pictures import write_pictures
+        from cagefield.scene.frames import FrameRenderer
         from cagefield.scene.scene import Scene
 
+        if self.cluster is not None:
+            from cagefield.cluster.connection import check_installed, parse_cluster
+
+            parse_cluster(self.cluster)
+            check_installed()
         scene = Scene.open(self.scene)
         cameras, fps = self._cameras(scene)
         if single and len(cameras) != 1:
             raise CagefieldError(
                 f"{self.out} is one picture, the views are {len(cameras)}; give a folder or --views"
             )
-        devices.start(self.device)
-        pictures = track(self._pictures(scene, cameras), len(cameras), "Rendering")
+        files = FrameFiles(cameras, parse_frames(self.frames, len(cameras)), self._options().ends)
         if video:
-            write_video(self.out, (in_one_row(picture) for picture in pictures), fps)
+            self._write_video(scene, files, fps)
         elif single:
-            for picture in pictures:
-                write_pictures(self.out.with_suffix(""), picture)
+            self._start_device()
+            write_pictures(
+                self.out.with_suffix(""), FrameRenderer(scene, self._options()).pictures(cameras[0], None)[0]
+            )
         else:
-            digits = max(4, len(str(len(cameras) - 1)))
-            with merged_folder(self.out) as folder:
-                for index, picture in enumerate(pictures):
-                    write_pictures(folder / f"{index:0{digits}d}", picture)
-        count = f"{len(cameras)} picture{'s' if len(cameras) > 1 else ''}"
-        print(f"{count} in {self.out}")
+            self._write_folder(scene, files)
+        count = f"{len(files.frames)} picture{'s' if len(files.frames) != 1 else ''}"
+        print(f"{count} in {self.out}" + (f", {files.kept} of them kept" if self.keep else ""))
+
+    def _write_folder(self, scene: Scene, files: FrameFiles) -> None:
+        from contextlib import nullcontext
+
+        from cagefield.files.atomic import merged_folder
+
+        with nullcontext(self.out) if self.keep else merged_folder(self.out) as folder:
+            self._write_frames(scene, files, folder)
+
+    def _write_video(self, scene: Scene, files: FrameFiles, fps: float) -> None:
+        """Encodes frames as they are rendered; those of a cluster, or to be kept, from their files."""
+        from cagefield.cli.frame_files import frames_folder
+        from cagefield.images.image_files import write_video
+        from cagefield.images.pictures import in_one_row
+        from cagefield.scene.frames import FrameRenderer
+
+        if not self.keep and self.cluster is None:
+            self._start_device()
+            rendered = FrameRenderer(scene, self._options()).sequence(files.selected)
+            pictures = track(rendered, len(files.frames), "Rendering")
+            write_video(self.out, (in_one_row(picture) for picture in pictures), fps)
+            return
+        with frames_folder(self.out, self.keep) as folder:
+            self._write_frames(scene, files, folder)
+            write_video(self.out, (in_one_row(picture) for picture in files.read(folder)), fps)
+
+    def _write_frames(self, scene: Scene, files: FrameFiles, folder: Path) -> None:
+        """Writes the frames that are to be rendered, here or on the cluster."""
+        from cagefield.scene.frames import FrameRenderer
+
+        wanted = files.missing(folder) if self.keep else files.frames
+        if not wanted:
+            return
+        if self.cluster is None:
+            self._start_device()
+            renderer = FrameRenderer(scene, self._options())
+            for _ in track(files.render(renderer, wanted, folder), len(wanted), "Rendering"):
+                pass
+            return
+        from cagefield.cluster.connection import TlsFiles, parse_cluster
+        from cagefield.cluster.frame_cluster import open_frame_cluster
+
+        tls = TlsFiles(*self.cluster_tls) if self.cluster_tls else None
+        with open_frame_cluster(
+            parse_cluster(self.cluster), scene, self._options(), folder, device=self.device, tls=tls
+        ) as cluster:
+            for _ in track(files.render_on(cluster, wanted, folder), len(wanted), "Rendering"):
+                pass
+
+    def _start_device(self) -> None:
+        from cagefield.compute import devices
+
+        devices.start(self.device)
+
+    def _options(self) -> FrameOptions:
+        from cagefield.scene.frames import FrameOptions
+
+        return FrameOptions(
+            parse_background(self.background),
+            self.depth,
+            self.normals,
+            self.compare,
+            self.unedited,
+            self.exact,
+        )
 
     def _check_options(self) -> None:
         from cagefield.cameras.camera_paths import MAX_FPS, MIN_FPS
@@ -114,6 +194,14 @@ class Render:
             raise CagefieldError("--dataparser-transforms belongs to --camera-path; give both or neither")
         if self.compare and self.unedited:
             raise CagefieldError("--compare and --unedited exclude each other; give one of them")
+        if self.keep and self.overwrite:
+            raise CagefieldError("--keep and --overwrite exclude each other; give one of them")
+        if self.cluster_tls and self.cluster is None:
+            raise CagefieldError("--cluster-tls belongs to --cluster; give both or neither")
+        if self.out.suffix.lower() == ".png" and (self.keep or self.frames or self.cluster is not None):
+            raise CagefieldError(
+                f"--keep, --frames and --cluster are for several pictures, {self.out} is one; give a folder"
+            )
         if self.fps is not None and not MIN_FPS <= self.fps <= MAX_FPS:
             raise CagefieldError(f"--fps is {self.fps}; give a number from {MIN_FPS:g} to {MAX_FPS:g}")
         background = parse_background(self.background)
@@ -155,21 +243,3 @@ class Render:
                     f"--views {index} is out of range; {self.split} views go from 0 to {len(cameras) - 1}"
                 )
         return tuple(cameras[index] for index in self.views) or cameras
-
-    def _pictures(self, scene: Scene, cameras: list[Camera]) -> Iterator[Pictures]:
-        """Per camera: end of the file name -> picture."""
-        from cagefield.cli.pictures import DepthScale, pictures_of
-        from cagefield.edits import EditStack
-
-        background = parse_background(self.background)
-        unedited = scene.with_edits(EditStack([]))
-        shown = [unedited, scene] if self.compare else [unedited] if self.unedited else [scene]
-        scale: DepthScale | None = None
-        for camera in cameras:
-            frames = [
-                one.render(camera, background=background, normals=self.normals, exact=self.exact)
-                for one in shown
-            ]
-            if self.depth and scale is None:
-                scale = DepthScale.fitted([frame.depth for frame in frames])
-            yield pictures_of(frames, scale)

@@ -22,7 +22,7 @@ try:
 except ImportError:  # no such locks here
     fcntl = None  # type: ignore[assignment]
 
-_ROLES = ("copy", "export", "open", "splats", "fit", "points", "bench")
+_ROLES = ("copy", "export", "open", "splats", "fit", "points", "bench", "cluster")
 
 _MARK = re.compile(rf"cagefield-({'|'.join(_ROLES)})-([0-9a-f]{{6}})-(\d+)-\w+")
 

@@ -1,15 +1,15 @@
-"""Frames as files: colour, depth and normals, before and after side by side."""
+"""Frames as files: color, depth and normals, before and after side by side."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from cagefield.files.atomic import replaced_file
-from cagefield.images.image_files import side_by_side, write_png
+from cagefield.images.image_files import read_image, side_by_side, write_png
 from cagefield.images.render_result import RenderResult
 from cagefield.typing import AnyArray
 
@@ -72,3 +72,16 @@ def write_pictures(stem: Path, pictures: Pictures) -> None:
                 np.save(file, picture)
         else:
             write_png(path, picture)
+
+
+def read_pictures(stem: Path, ends: Iterable[str]) -> Pictures:
+    """The pictures of a frame that `write_pictures` wrote, without its arrays, as uint8.
+
+    Raises DatasetError for a file that is missing or damaged.
+    """
+    return {end: read_image(stem.with_name(stem.name + end)) for end in ends if end.endswith(".png")}
+
+
+def has_pictures(stem: Path, ends: Iterable[str]) -> bool:
+    """Whether all files of a frame are there; each was written whole."""
+    return all(stem.with_name(stem.name + end).is_file() for end in ends)

@@ -1,0 +1,175 @@
+"""Frames of a scene on a cluster: tasks submitted, tried again on other workers, gathered or cancelled.
+
+A frame is a task. dask runs it again where its worker is lost (up to `distributed.scheduler.allowed-failures`
+workers, 3) and where it fails for a passing reason (RETRIES times); errors that the user can cure end the
+command. Workers hold no state that a frame depends on, so pictures are those of one process.
+"""
+
+from __future__ import annotations
+
+import uuid
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import cagefield
+from cagefield.cluster.connection import TlsFiles, connect
+from cagefield.cluster.frame_tasks import FrameJob, FrameResult, fit_depth_scale, render_frame, write_contents
+from cagefield.cluster.scene_archive import SceneArchive, SceneSource
+from cagefield.errors import CagefieldError
+from cagefield.files.stale_files import hidden_name
+from cagefield.images.pictures import DepthScale
+from cagefield.scene.frames import FrameOptions
+from cagefield.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+    from cagefield.cameras.camera import Camera
+
+RETRIES = 2
+"""Further tries of a frame that fails, a full disk or a network folder that is away for a moment."""
+
+
+class FrameCluster:
+    """Workers that have the scene, and a folder for its frames; made by `open_frame_cluster`."""
+
+    def __init__(self, client: Client, job: FrameJob) -> None:
+        self.client, self.job = client, job
+
+    def depth_scale(self, camera: Camera) -> DepthScale:
+        """The depth scale of a camera's frame, which is not written."""
+        future = self.client.submit(fit_depth_scale, self.job, camera, retries=RETRIES, pure=False)
+        ((_, result),) = self._results({future: "the depth scale"})
+        assert result.scale is not None
+        return result.scale
+
+    def render(
+        self, cameras: Mapping[str, Camera], scale: DepthScale | None = None
+    ) -> Iterator[tuple[str, DepthScale | None]]:
+        """Name and depth scale of each frame, in the order in which their files are complete.
+
+        `cameras` has the camera of each name, the beginning of the file names. The frames that are not done
+        are cancelled when the iteration ends early. Raises CagefieldError for a frame that cannot be
+        rendered.
+        """
+        futures = {
+            self.client.submit(render_frame, self.job, camera, name, scale, retries=RETRIES, pure=False): name
+            for name, camera in cameras.items()
+        }
+        for name, result in self._results(futures):
+            write_contents(self.job.folder / name, result)
+            yield name, result.scale
+
+    def _results(self, futures: dict[Future, str]) -> Iterator[tuple[str, FrameResult]]:
+        from distributed import CancelledError, KilledWorker, as_completed
+
+        names = {future.key: name for future, name in futures.items()}
+        waiting = set(futures)
+        futures.clear()  # a result is released once it is here
+        try:
+            for future in as_completed(list(waiting), loop=self.client.loop):
+                name = names[future.key]
+                try:
+                    result: FrameResult = future.result()
+                except KilledWorker as error:
+                    raise CagefieldError(
+                        f"frame {name}: {_losses(error)} workers ended while they rendered it, for want of "
+                        "memory perhaps; use fewer workers, and --keep"
+                    ) from None
+                except CancelledError:
+                    raise CagefieldError("the connection to the cluster is lost; go on with --keep") from None
+                if result.error:
+                    raise CagefieldError(f"frame {name}: {result.error}")
+                waiting.discard(future)
+                yield name, result
+        finally:
+            if waiting:
+                self.client.cancel(list(waiting), force=True)
+
+
+@contextmanager
+def open_frame_cluster(
+    cluster: int | str,
+    scene: Scene,
+    options: FrameOptions,
+    folder: Path,
+    *,
+    device: str = "auto",
+    tls: TlsFiles | None = None,
+) -> Iterator[FrameCluster]:
+    """Workers for the frames of a scene that was opened from a folder, written into `folder`, which is made.
+
+    `cluster` is a number of local workers, an address or a scheduler file; `device` is the workers'. Lost
+    workers are counted in a warning at the end.
+
+    Raises:
+        CagefieldError: no package, no reply, workers with another version of cagefield.
+        SceneError: workers do not see the folder of a scene that pastes from others.
+    """
+    if scene.folder is None:
+        raise CagefieldError("a scene for a cluster must be saved; give one from Scene.open")
+    folder.mkdir(parents=True, exist_ok=True)
+    source = SceneSource.read(scene.folder)
+    mark = folder / hidden_name(folder / f"mark{uuid.uuid4().hex[:8]}", "part")
+    job = FrameJob(source, options, device, folder.absolute(), mark.name)
+    with ExitStack() as opened:
+        client = opened.enter_context(connect(cluster, tls))
+        mark.touch()
+        opened.callback(mark.unlink, missing_ok=True)
+        if not _all_see(client, source):
+            from cagefield.cluster.worker_plugin import ArchivePlugin
+
+            archive = SceneArchive.packed(source, scene)
+            client.register_plugin(ArchivePlugin(archive), name=archive.name)
+            opened.callback(client.unregister_worker_plugin, archive.name)
+        lost = _lost_workers(client)
+        opened.callback(client.unsubscribe_topic, "all")
+        try:
+            yield FrameCluster(client, job)
+        finally:
+            if lost:
+                text = "1 worker was" if len(lost) == 1 else f"{len(lost)} workers were"
+                warnings.warn(f"{text} lost; others rendered their frames", stacklevel=2)
+
+
+def _all_see(client: Client, source: SceneSource) -> bool:
+    """Whether all workers have the scene folder. Raises CagefieldError for another version of cagefield."""
+    replies = client.run(_look, source, on_error="return")
+    for worker, reply in replies.items():
+        if isinstance(reply, Exception):
+            if isinstance(reply, ImportError | AttributeError):
+                raise CagefieldError(
+                    f"worker {worker} has no cagefield with clusters; pip install 'cagefield[cluster]' there"
+                )
+            return False  # the worker was lost, and another one will begin
+        if reply[0] != cagefield.__version__:
+            raise CagefieldError(
+                f"worker {worker} has cagefield {reply[0]}, this is {cagefield.__version__}; install the "
+                "same version everywhere"
+            )
+    return all(reply[1] for reply in replies.values())
+
+
+def _look(source: SceneSource) -> tuple[str, bool]:
+    """Version of cagefield on a worker, and whether the scene folder is there."""
+    return cagefield.__version__, source.is_here()
+
+
+def _lost_workers(client: Client) -> list[str]:
+    """Addresses of workers that leave from now on; the list grows."""
+    lost: list[str] = []
+
+    def noted(event: Any) -> None:
+        message = event[1] if isinstance(event, tuple) else event
+        if isinstance(message, dict) and message.get("action") == "remove-worker":
+            lost.append(str(message.get("worker", "")))
+
+    client.subscribe_topic("all", noted)
+    return lost
+
+
+def _losses(error: Exception) -> int:
+    return int(getattr(error, "allowed_failures", 3)) + 1

@@ -1,0 +1,236 @@
+"""Frames on a cluster of local workers: files of one process, also where workers are killed.
+
+The oracle is the command without a cluster: all files, byte for byte.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import pickle
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cagefield import Cage, Edit, EditStack, Scene
+from cagefield.cameras.camera import Camera
+from cagefield.cli import main
+from cagefield.cli.frame_files import FrameFiles, parse_frames
+from cagefield.cluster.connection import TlsFiles, connect, parse_cluster
+from cagefield.cluster.frame_tasks import FrameJob, render_frame, write_contents
+from cagefield.cluster.scene_archive import SceneArchive, SceneSource, content_digest
+from cagefield.errors import CagefieldError, SceneError
+from cagefield.images.pictures import has_pictures
+from cagefield.scene.frames import FrameOptions, FrameRenderer
+from commands import printed, refused
+from scenes import ball_cameras, ball_scene, files_of
+
+needs_dask = pytest.mark.skipif(
+    importlib.util.find_spec("distributed") is None,
+    reason="dask.distributed is not installed (extra cluster)",
+)
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scene folder whose ball is moved up."""
+    path = tmp_path_factory.mktemp("cluster") / "scene"
+    lift = Edit.move(Cage.box((0, 0, 0), 1.2)).translate((0, 0, 0.4))
+    ball_scene().with_edits(EditStack([lift])).save(path)
+    return path
+
+
+def run(*argv: object) -> None:
+    assert main([str(arg) for arg in argv]) == 0
+
+
+@needs_dask
+def test_frames_of_a_cluster_that_loses_a_worker_are_those_of_one_process(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Depth, before and after, an orbit of 6; a worker is killed once two frames are there, amid others."""
+    options = ["--turntable", 6, "--size", "32x24", "--depth", "--compare"]
+    run("render", scene, "-o", tmp_path / "one", *options)
+    killed = kill_after(monkeypatch, frames=2, times=1)
+    run("render", scene, "-o", tmp_path / "many", *options, "--cluster", 2)
+    assert len(killed) == 1
+    expected = files_of(tmp_path / "one")
+    assert len(expected) == 18 and files_of(tmp_path / "many") == expected
+    assert "1 worker was lost" in capsys.readouterr().err
+
+
+@needs_dask
+@pytest.mark.nightly
+def test_two_kills_among_three_workers(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--turntable", 24, "--size", "48x32", "--depth", "--normals", "--compare"]
+    run("render", scene, "-o", tmp_path / "one", *options)
+    killed = kill_after(monkeypatch, frames=5, times=2)
+    run("render", scene, "-o", tmp_path / "many", *options, "--cluster", 3)
+    assert len(set(killed)) == 2
+    assert files_of(tmp_path / "many") == files_of(tmp_path / "one")
+    assert "2 workers were lost" in capsys.readouterr().err
+
+
+def kill_after(monkeypatch: pytest.MonkeyPatch, *, frames: int, times: int) -> list[int]:
+    """Kills a worker by SIGKILL after every `frames` frames; the processes that were killed."""
+    from cagefield.cluster.frame_cluster import FrameCluster
+
+    killed: list[int] = []
+    done = 0
+    render = FrameCluster.render
+
+    def killing(self: FrameCluster, *args: object) -> Iterator[object]:
+        nonlocal done
+        for frame in render(self, *args):  # type: ignore[arg-type]
+            yield frame
+            done += 1
+            if len(killed) < times and done >= frames * (len(killed) + 1):
+                processes = self.client.run(os.getpid, on_error="ignore")
+                victim = next(pid for pid in processes.values() if pid not in (*killed, os.getpid()))
+                os.kill(victim, signal.SIGKILL)
+                killed.append(victim)
+
+    monkeypatch.setattr(FrameCluster, "render", killing)
+    return killed
+
+
+def test_kept_frames_stay_and_the_others_are_added(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--turntable", 5, "--size", "32x24", "--depth"]
+    run("render", scene, "-o", tmp_path / "whole", *options)
+    expected = files_of(tmp_path / "whole")
+    out = tmp_path / "parts"
+    run("render", scene, "-o", out, *options, "--frames", "2-3")
+    assert files_of(out) == {name: expected[name] for name in expected if name[:4] in ("0002", "0003")}
+    (out / "0003_depth.npy").unlink()  # incomplete: rendered again
+    before = (out / "0002.png").stat().st_mtime_ns
+    text = printed(capsys, "render", scene, "-o", out, *options, "--keep")
+    assert "5 pictures in" in text and "1 of them kept" in text
+    assert files_of(out) == expected and (out / "0002.png").stat().st_mtime_ns == before
+    assert "5 of them kept" in printed(capsys, "render", scene, "-o", out, *options, "--keep")
+
+
+def test_a_video_from_kept_frames_is_the_video(scene: Path, tmp_path: Path) -> None:
+    options = ["--turntable", 4, "--size", "32x24", "--normals", "--depth"]
+    run("render", scene, "-o", tmp_path / "one.mp4", *options)
+    run("render", scene, "-o", tmp_path / "kept.mp4", *options, "--keep")
+    assert (tmp_path / "kept.mp4").read_bytes() == (tmp_path / "one.mp4").read_bytes()
+    assert len(list((tmp_path / "kept_frames").iterdir())) == 16
+
+
+def test_a_worker_without_the_folders_returns_the_files(scene: Path, tmp_path: Path) -> None:
+    """The archive is unpacked where the folder is not, and removed; contents are those of the files."""
+    opened = Scene.open(scene)
+    here = SceneSource.read(scene)
+    elsewhere = SceneSource(tmp_path / "not there", here.digest)
+    options = FrameOptions(depth=True)
+    job = FrameJob(elsewhere, options, "cpu", tmp_path / "nor there", "mark")
+    camera = ball_cameras(1)[0]
+    missing = render_frame(job, camera, "0000", None)
+    assert "is not on this worker" in missing.error
+    archive = pickle.loads(pickle.dumps(SceneArchive.packed(here, opened)))
+    archive.source = elsewhere
+    archive.setup()
+    try:
+        unpacked = elsewhere.find()
+        assert content_digest(unpacked) == here.digest
+        result = render_frame(job, pickle.loads(pickle.dumps(camera)), "0000", None)
+    finally:
+        archive.teardown()
+    assert not unpacked.exists() and result.error == ""
+    write_contents(tmp_path / "0000", result)
+    assert has_pictures(tmp_path / "0000", options.ends)
+    pictures, scale = FrameRenderer(opened, options).pictures(camera, None)
+    np.testing.assert_array_equal(np.load(tmp_path / "0000_depth.npy"), pictures["_depth.npy"])
+    assert result.scale == scale and not (tmp_path / "nor there").exists()
+
+
+def test_another_scene_than_the_clients_is_not_rendered(scene: Path, tmp_path: Path) -> None:
+    ball_scene().save(tmp_path / "scene")
+    source = SceneSource.read(tmp_path / "scene")
+    assert source.find() == tmp_path / "scene"
+    assert content_digest(scene) != source.digest
+    Scene.open(scene).save(tmp_path / "scene", overwrite=True)
+    with pytest.raises(SceneError, match="was changed since the start"):
+        source.find()
+
+
+def test_a_scene_with_pastes_needs_a_shared_folder(scene: Path, tmp_path: Path) -> None:
+    ball_scene().save(tmp_path / "other")
+    opened = Scene.open(scene)
+    pasting = opened.with_edits(opened.edits.append(opened.paste(tmp_path / "other")))
+    with pytest.raises(SceneError, match="pastes from other scenes"):
+        SceneArchive.packed(SceneSource.read(scene), pasting)
+
+
+@pytest.mark.parametrize(
+    ("text", "cluster"),
+    [("3", 3), ("tcp://127.0.0.1:8786", "tcp://127.0.0.1:8786"), ("tls://farm:8786", "tls://farm:8786"),
+     ("scheduler.json", "scheduler.json")],
+)  # fmt: skip
+def test_clusters(text: str, cluster: int | str) -> None:
+    assert parse_cluster(text) == cluster
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "257", "farm", "tcp://farm", "http://farm:1", "tcp://farm:x"])
+def test_no_clusters(text: str) -> None:
+    with pytest.raises(CagefieldError, match="is no cluster; give a number of local workers"):
+        parse_cluster(text)
+
+
+def test_frame_ranges() -> None:
+    assert parse_frames(None, 3) == range(3)
+    assert parse_frames("1-2", 3) == range(1, 3) and parse_frames("2", 3) == range(2, 3)
+    for text in ("2-3", "2-1"):
+        with pytest.raises(CagefieldError, match="pictures go from 0 to 2"):
+            parse_frames(text, 3)
+    with pytest.raises(CagefieldError, match="is no range"):
+        parse_frames("a-b", 3)
+
+
+def test_kept_pictures_of_another_size_are_refused(scene: Path, tmp_path: Path) -> None:
+    run("render", scene, "-o", tmp_path / "out", "--size", "12x8")
+    cameras: list[Camera] = list(ball_scene().cameras["test"])
+    with pytest.raises(CagefieldError, match="8 pixels high, not 16"):
+        FrameFiles(cameras, range(2), (".png",)).missing(tmp_path / "out")
+
+
+@needs_dask
+def test_encrypted_clusters_need_certificates(tmp_path: Path) -> None:
+    with pytest.raises(CagefieldError, match="needs certificates; give --cluster-tls"), connect("tls://a:1"):
+        pass
+    files = TlsFiles(*(tmp_path / name for name in ("ca.pem", "cert.pem", "key.pem")))
+    with pytest.raises(CagefieldError, match=r"there is no file .*ca\.pem"):
+        files.security()
+    with pytest.raises(CagefieldError, match="is not encrypted; give tls://"), connect("tcp://a:1", files):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--keep", "--overwrite"], "exclude each other"),
+        (["--cluster-tls", "a", "b", "c"], "belongs to --cluster"),
+        (["--cluster", "none"], "is no cluster"),
+        (["--frames", "9"], "pictures go from 0 to 1"),
+    ],
+)
+def test_options_that_are_refused(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], message: str
+) -> None:
+    assert message in refused(capsys, "render", scene, "-o", tmp_path / "out", *options)
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_the_package_the_cure_is_named(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    error = refused(capsys, "render", scene, "-o", tmp_path / "out", "--cluster", 2)
+    assert "pip install 'cagefield[cluster]'" in error and not (tmp_path / "out").exists()
