@@ -75,7 +75,8 @@ def test_the_slab_beside_stays(field: VoxelField | SplatField, by: tuple[float, 
     plain = Edit.points([TIP], radius=0.8).translate(by).exact_warp
     moved, same = (w.to_deformed(left).points for w in (warp, plain))
     assert np.linalg.norm(same - left, axis=1).max() > 0.8 * length
-    assert np.abs(moved - same).max() < 0.02 * length
+    # Matter that falls behind the points on the way has its detour from beside the slab: some percent.
+    assert np.abs(moved - same).max() < 0.05 * length
     # And by plain ones the other slab does not stay.
     assert np.linalg.norm(plain.to_deformed(right).points - right, axis=1).max() > 0.1 * length
 
