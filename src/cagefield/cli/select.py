@@ -85,7 +85,8 @@ class Select:
             check_destination(self.out, self.overwrite)
         scene = Scene.open(self.scene)
         elements = elements_of_field(scene.field)
-        seen = deformed_positions(elements.positions, EditStack(scene.edits))
+        edits = EditStack(scene.patcher.with_detours(scene.edits.resolved))
+        seen = deformed_positions(elements.positions, edits)
         mask = self._selected(elements, seen)
         noun = "splats" if elements.kind == "splats" else "cells"
         print(f"{np.count_nonzero(mask)} of {len(mask)} {noun} selected")

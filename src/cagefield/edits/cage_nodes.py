@@ -79,13 +79,16 @@ def _mesh(node: Node, folder: Path | None) -> MeshCage:
 
 
 def _control_points(node: Node) -> ControlPoints:
-    keys = node.mapping(required=("points", "radius"), optional=("falloff", "pivot", "linear"))
+    keys = node.mapping(required=("points", "radius"), optional=("falloff", "connected", "pivot", "linear"))
     points = [point.vector() for point in keys["points"].items()]
     pivot = keys["pivot"].vector() if "pivot" in keys else None
     linear = [row.vector() for row in keys["linear"].items(3)] if "linear" in keys else None
     falloff = keys["falloff"].choice(FALLOFF_CURVES) if "falloff" in keys else "smooth"
+    connected = "connected" in keys and keys["connected"].boolean()
     try:
-        return ControlPoints(points, keys["radius"].number(), falloff, pivot=pivot, linear=linear)
+        return ControlPoints(
+            points, keys["radius"].number(), falloff, pivot=pivot, linear=linear, connected=connected
+        )
     except CagefieldError as error:
         raise node.error(str(error)) from None
 
@@ -151,6 +154,8 @@ def _from_mesh(cage: MeshCage) -> dict[str, Any]:
 
 def _from_control_points(cage: ControlPoints) -> dict[str, Any]:
     content: dict[str, Any] = {"points": cage.points.tolist(), "radius": cage.radius, "falloff": cage.falloff}
+    if cage.connected:
+        content["connected"] = True
     if not np.array_equal(ControlPoints(cage.points, cage.radius).pivot, cage.pivot):
         content["pivot"] = cage.pivot.tolist()
     if not np.array_equal(cage.linear, np.eye(3)):

@@ -155,16 +155,18 @@ class Edit(ABC):
         *,
         radius: float,
         falloff: str = "smooth",
+        connected: bool = False,
         outer: Cage | None = None,
         name: str = "",
         **options: Any,
     ) -> Continuous:
         """Edit of control points [n,3], with which everything within the radius follows, less and less.
 
-        `falloff` is one of smooth, sphere, root, sharp, linear; see `ControlPoints`. Without an outer cage
-        nothing else confines it. `options` are those of `continuous`.
+        `falloff` is one of smooth, sphere, root, sharp, linear; see `ControlPoints`. `connected` measures
+        the radius through dense matter, which a `Scene` finds; otherwise it is straight. Without an outer
+        cage nothing else confines it. `options` are those of `continuous`.
         """
-        cage = ControlPoints(points, radius, falloff)
+        cage = ControlPoints(points, radius, falloff, connected=connected)
         return Continuous(cage, outer, name=name, **options)  # type: ignore[arg-type]
 
     @staticmethod
@@ -440,6 +442,11 @@ class Continuous(Edit):
     @cached_property
     def exact_warp(self) -> ContinuousWarp:
         self.check()
+        if isinstance(self.inner, ControlPoints) and self.inner.is_unprepared:
+            raise self.error(
+                "connected control points follow the density of a field, and no field is given; render the"
+                " edit as part of a Scene (Scene.prepared_edits), or leave connected out"
+            )
         inner = inner_map_between(self.inner, self.deformed)
         return ContinuousWarp(inner, self.outer, self._last_shell)
 

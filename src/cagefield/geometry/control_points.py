@@ -14,6 +14,7 @@ from cagefield.errors import CageError
 from cagefield.geometry import hexahedron
 from cagefield.geometry.cage import Axes, Cage
 from cagefield.geometry.cage_checks import format_vector, read_only
+from cagefield.geometry.detour_grid import DetourGrid
 from cagefield.geometry.point_deformers import FALLOFF_CURVES, mirrored
 from cagefield.typing import Array, Mask
 
@@ -35,6 +36,11 @@ class ControlPoints(Cage):
     - pivot: [3], about which `rotate`, `scale` and `shear` turn; the mean of the points if left out.
     - linear: [3,3] with a positive determinant, the linear map that these operations have made of the space
       around the points: distances are measured before it. The identity for new points.
+    - connected: True measures distances through dense matter ("Connected Only" of 3D editors), so that a
+      finger moves without the one beside it.
+    - detours: of connected points, how much longer than straight the ways through the matter of a field are,
+      in the space of the canonical `local_points`; None until a scene prepares the edit
+      (`selection.connected_points`). No part of edit files.
 
     `corners` are those of the parallelepiped that holds the balls around all points, under `linear`.
 
@@ -50,6 +56,8 @@ class ControlPoints(Cage):
     radius: float
     falloff: str
     linear: Array
+    connected: bool
+    detours: DetourGrid | None
 
     is_hexahedron: ClassVar[bool] = False
     has_own_falloff: ClassVar[bool] = True
@@ -64,6 +72,8 @@ class ControlPoints(Cage):
         *,
         pivot: ArrayLike | None = None,
         linear: ArrayLike | None = None,
+        connected: bool = False,
+        detours: DetourGrid | None = None,
     ) -> None:
         p = _points(points)
         r = _radius(radius)
@@ -76,7 +86,14 @@ class ControlPoints(Cage):
                 f"linear map of control points must have a positive determinant, got {np.linalg.det(A):.3g};"
                 " leave it out for new points"
             )
+        if not isinstance(connected, bool) or (detours is not None and not connected):
+            raise CageError(
+                f"connected must be True or False, and True with detours, got {connected!r:.40}; of points"
+                " that are not connected leave detours out"
+            )
         for name, value in (
+            ("connected", connected),
+            ("detours", detours),
             ("points", p),
             ("radius", r),
             ("falloff", falloff),
@@ -97,7 +114,8 @@ class ControlPoints(Cage):
         return hash((self.points.tobytes(), self.radius, self.falloff, self.linear.tobytes()))
 
     def __repr__(self) -> str:
-        return f"ControlPoints({self.points.tolist()}, radius={self.radius}, falloff={self.falloff!r})"
+        shape = f"{self.points.tolist()}, radius={self.radius}, falloff={self.falloff!r}"
+        return f"ControlPoints({shape}{', connected=True' if self.connected else ''})"
 
     @property
     def handles(self) -> Array:
@@ -109,8 +127,37 @@ class ControlPoints(Cage):
         return (
             isinstance(other, ControlPoints)
             and np.array_equal(self.points, other.points)
-            and (self.radius, self.falloff) == (other.radius, other.falloff)
+            and (self.radius, self.falloff, self.connected) == (other.radius, other.falloff, other.connected)
+            and self.detours == other.detours
             and np.array_equal(self.linear, other.linear)
+        )
+
+    @property
+    def is_unprepared(self) -> bool:
+        """True of connected points whose detours are not known yet."""
+        return self.connected and self.detours is None
+
+    def with_detours(self, detours: DetourGrid | None) -> ControlPoints:
+        """The connected points with the detours of a field; None leaves them out."""
+        return self.with_reach(detours=detours)
+
+    def with_reach(
+        self,
+        *,
+        radius: float | None = None,
+        falloff: str | None = None,
+        connected: bool | None = None,
+        detours: DetourGrid | None = None,
+    ) -> ControlPoints:
+        """The points with another radius, falloff or kind of distance; None leaves each, but for detours."""
+        return ControlPoints(
+            self.points,
+            self.radius if radius is None else radius,
+            self.falloff if falloff is None else falloff,
+            pivot=self.pivot,
+            linear=self.linear,
+            connected=self.connected if connected is None else connected,
+            detours=detours,
         )
 
     @cached_property
@@ -144,7 +191,8 @@ class ControlPoints(Cage):
         """The points across the plane where coordinate `axis` is `at`; their numbers stay."""
         F = np.diag(np.where(np.arange(3) == axis, -1.0, 1.0))
         points, pivot = mirrored(self.points, axis, at), mirrored(self.pivot, axis, at)
-        return self._moved(points, pivot, linear=F @ self.linear @ F)
+        # Other matter: its detours are not those of this side.
+        return self.with_detours(None)._moved(points, pivot, linear=F @ self.linear @ F)
 
     def mirrored_handle(self, handle: int, axis: int) -> int:
         """The number itself: points keep theirs."""
@@ -169,7 +217,15 @@ class ControlPoints(Cage):
         self, points: Array, pivot: Array, *, rigid: bool = False, linear: Array | None = None
     ) -> ControlPoints:
         A = self.linear if linear is None else linear
-        return ControlPoints(points, self.radius, self.falloff, pivot=pivot, linear=A)
+        return ControlPoints(
+            points,
+            self.radius,
+            self.falloff,
+            pivot=pivot,
+            linear=A,
+            connected=self.connected,
+            detours=self.detours,
+        )
 
     def _box(self) -> Array:
         y = self.local_points

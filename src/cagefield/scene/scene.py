@@ -361,7 +361,8 @@ class Scene:
         That is a voxel's smallest edge, in the middle of the box of interest where the field is unbounded, or
         the width of most splats.
         """
-        return self.edits.lattice_errors(self.field.sample_spacing)
+        edits = EditStack(self.patcher.with_detours(self.edits))
+        return edits.lattice_errors(self.field.sample_spacing)
 
     def render(
         self,

@@ -4,11 +4,17 @@ With y = F^-1 (x - c), d_j = |y - y_j| (see `control_point_motion`), n points an
 
     1 / d^p = sum_j 1 / d_j^p, p = 12:   the distance from the points, smooth where two are equally near;
     b_j = d_j^-4 / sum_i d_i^-4:         how much of the motion of point j is taken over;
-    v(x, t) = u(x) w(1 - d / r) (dc/dt + dF/dt y + F sum_j b_j dy_j/dt),
+    q = y - t sum_j b_j dy_j/dt:         the place at t = 0 of matter that follows the points;
+    v(x, t) = u(x) w(1 - (d + E(q)) / r) (dc/dt + dF/dt y + F sum_j b_j dy_j/dt),
 
 with w the falloff (see `falloff_curves`) and u the weight of the outer cage (see `outer_planes`), which is 1
 where that holds all that the points reach. d is at most the distance from the nearest point, equal to it at
 the points, and its gradient is at most 1. A point takes its place along: v(p_j, t) = dp_j/dt.
+
+E >= 0 is 0, but for connected points (see `geometry.detour_grid`): there d + E is the way through dense
+matter, at t = 0 and for what follows the points. E is 0 at the points, and its gradient bounded by its nodes:
+
+    |d(d + E(q)) / dx| <= (1 + |dE/dq| (1 + t |d sum_j b_j dy_j/dt / dy|)) |F^-1|.
 
 The blend b is Shepard's (inverse distances). For data e_j = dy_j/dt at points s_ij apart its slope is at most
 
@@ -30,7 +36,7 @@ import numpy as np
 
 from cagefield.geometry.cage import Cage
 from cagefield.geometry.control_points import LEAST_SPACING, ControlPoints
-from cagefield.typing import Array
+from cagefield.typing import Array, Float32
 from cagefield.warps.cage_maps import flow_between, inner_map_between, reach_between
 from cagefield.warps.control_point_motion import DISTANCE_POWER, ControlPointMotion
 from cagefield.warps.falloff import Falloff
@@ -44,6 +50,10 @@ BLEND_POWER = 4
 
 LEAST_ROOM = 1e-3
 """Least distance of a control point from the outer cage on its way, as a share of the radius."""
+
+NO_NODES: Float32 = np.zeros((0, 0, 0), np.float32)
+"""Nodes of no detours; read-only, as those of a grid, so that kernels are compiled once."""
+NO_NODES.setflags(write=False)
 
 _CHUNK = 400_000
 """Pairs of points and control points at a time."""
@@ -123,12 +133,16 @@ class ControlPointVelocity:
         share = (nearest[:, None] / d_j) ** DISTANCE_POWER
         d = nearest * share.sum(axis=1) ** (-1.0 / DISTANCE_POWER)
         d_slope = (((d[:, None] / d_j) ** (DISTANCE_POWER + 1))[:, :, None] * toward).sum(axis=1)
-        w, slope = curve(self.inner.falloff, 1.0 - d / r)
         b = (nearest[:, None] / d_j) ** BLEND_POWER
         b /= b.sum(axis=1, keepdims=True)
         e = b @ motion.rates
         left = b[:, :, None] * (motion.rates - e[:, None])
         e_slope = -BLEND_POWER * np.einsum("nji,njk->nik", left, toward / d_j[:, :, None])
+        if self.inner.detours is not None:
+            E, dE = self.inner.detours.at(y - t * e)
+            d = d + E
+            d_slope = d_slope + dE - t * np.einsum("nk,nki->ni", dE, e_slope)
+        w, slope = curve(self.inner.falloff, 1.0 - d / r)
         V = motion.pivot_rate + y @ dF.T + e @ F.T
         dV = (dF + F @ e_slope) @ W
         dw = -(slope / r)[:, None] * (d_slope @ W)
@@ -162,7 +176,10 @@ class ControlPointVelocity:
                 0.5 * ratios.sum(axis=(1, 2)), (1.0 + n ** (1.0 / BLEND_POWER)) * ratios.max(axis=(1, 2))
             )
         fade = self.planes.slope_bound(self.fade) if self.fade > 0.0 else 0.0
-        steepest = STEEPEST[self.inner.falloff] / motion.radius * inverse + fade
+        detour = 0.0
+        if self.inner.detours is not None:
+            detour = self.inner.detours.slope_bound * (1.0 + BOUND_TIMES[1:] * blend)
+        steepest = STEEPEST[self.inner.falloff] / motion.radius * inverse * (1.0 + detour) + fade
         return np.asarray(steepest * speed + angle + stretch + size * inverse * blend)
 
     @cached_property
@@ -197,15 +214,19 @@ class ControlPointVelocity:
                 np.linalg.inv(F).reshape(n, 9),
                 dF.reshape(n, 9),
                 self.motion.local_points(times).reshape(n, -1),
+                times[:, None],
             ],
             axis=1,
         )
+        grid = self.inner.detours
+        nodes = NO_NODES if grid is None else grid.values
+        place = np.zeros(4) if grid is None else np.append(grid.origin, grid.edge)
         if jacobians:
-            march(x, J, self._header, moments, np.diff(knots))
+            march(x, J, self._header, moments, np.diff(knots), nodes, place)
         else:
             blocks = -(-len(x) // LANES)
             stride = next(n for n in range(int(0.618 * blocks) + 1, blocks + 2) if np.gcd(n, blocks) == 1)
-            march_lanes(x, self._header, moments, np.diff(knots), stride)
+            march_lanes(x, self._header, moments, np.diff(knots), stride, nodes, place)
         return x, J
 
 

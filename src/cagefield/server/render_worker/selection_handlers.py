@@ -96,7 +96,8 @@ class SelectionHandlers:
         self, shown: Shown, rows: np.ndarray[Any, Any], proceed: Callable[[], None] | None = None
     ) -> DeformedPositions:
         """Deformed positions of some elements, by the elements' numbers."""
-        edits = EditStack(self._renderers.edits(shown.edits))
+        patcher = self._renderers.scene.patcher
+        edits = EditStack(patcher.with_detours(self._renderers.edits(shown.edits)))
         found = deformed_positions(self._elements.positions[rows], edits, coarse=True, proceed=proceed)
         return DeformedPositions(found.points, rows[found.element])
 

@@ -125,7 +125,7 @@ class TaskHandlers:
         if isinstance(self._renderers.scene.field, SplatField):
             return Answered(task.number, (0.0, 0.0))
         try:
-            (edit,) = self._renderers.edits((task.edit,))
+            (edit,) = self._renderers.scene.patcher.with_detours(self._renderers.edits((task.edit,)))
             if not isinstance(edit, Continuous):
                 return Answered(task.number, (0.0, 0.0))
             most, mean = edit.lattice_error(samples=SAMPLES, proceed=cancellation_check(stop))

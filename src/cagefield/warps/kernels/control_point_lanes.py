@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.compute.numba_cache import njit
-from cagefield.typing import Array
+from cagefield.typing import Array, Float32
 from cagefield.warps.control_point_motion import DISTANCE_POWER
 from cagefield.warps.falloff_curves import ROOT_END
 from cagefield.warps.kernels.control_points import PLACES, PLANES, RATES, SLOPE
+from cagefield.warps.kernels.detours import detour
 
 LANES = 256
 
@@ -56,6 +57,8 @@ def _velocities(
     near: Array,
     w: Array,
     total: Array,
+    nodes: Float32,
+    place: Array,
 ) -> bool:
     """Write the velocities v [3,LANES] at x [3,LANES]; False, and nothing is written, where nothing moves.
 
@@ -94,6 +97,18 @@ def _velocities(
                 total[i] += q**_HALF_POWER
         for i in range(LANES):
             w[i] = max(1.0 - np.sqrt(near[i]) * total[i] ** (-1.0 / DISTANCE_POWER) / r, 0.0)
+    if head[4] > 0.0:
+        _blend(head, now, n, y, e, near, total, least)
+    else:
+        for a in range(3):
+            for i in range(LANES):
+                e[a, i] = head[RATES + a]
+    if len(nodes):
+        t = now[PLACES + 3 * n]
+        for i in range(LANES):
+            if w[i] > 0.0:
+                q0, q1, q2 = y[0, i] - t * e[0, i], y[1, i] - t * e[1, i], y[2, i] - t * e[2, i]
+                w[i] = max(w[i] - detour(nodes, place, q0, q1, q2) / r, 0.0)
     _weigh(int(head[0]), w)
     if fade > 0.0:
         for k in range(PLANES, PLANES + 24, 4):
@@ -102,12 +117,6 @@ def _velocities(
                 s = (offset - n0 * x[0, i] - n1 * x[1, i] - n2 * x[2, i]) / fade
                 s = min(max(s, 0.0), 1.0)
                 w[i] *= s * s * (3.0 - 2.0 * s)
-    if head[4] > 0.0:
-        _blend(head, now, n, y, e, near, total, least)
-    else:
-        for a in range(3):
-            for i in range(LANES):
-                e[a, i] = head[RATES + a]
     for a in range(3):
         F, D = 3 + 3 * a, SLOPE + 3 * a
         f0, f1, f2, d0, d1, d2 = now[F], now[F + 1], now[F + 2], now[D], now[D + 1], now[D + 2]
@@ -143,7 +152,15 @@ def _blend(
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", parallel=True)
-def march_lanes(x: Array, head: Array, moments: Array, steps: NDArray[np.float64], stride: int) -> None:
+def march_lanes(
+    x: Array,
+    head: Array,
+    moments: Array,
+    steps: NDArray[np.float64],
+    stride: int,
+    nodes: Float32,
+    place: Array,
+) -> None:
     """Take points x [N,3] through `steps` [K], in place; arguments as for `control_points.march`.
 
     `stride`, coprime to the number of blocks, is the order in which they are taken: those of a thread are
@@ -155,12 +172,12 @@ def march_lanes(x: Array, head: Array, moments: Array, steps: NDArray[np.float64
         first = (turn * stride) % blocks * LANES
         count = min(LANES, len(x) - first)
         room = np.empty((6, 3, LANES))
-        place, at, v, total, y, e = room[0], room[1], room[2], room[3], room[4], room[5]
+        here, at, v, total, y, e = room[0], room[1], room[2], room[3], room[4], room[5]
         flat = np.empty((3, LANES))
         near, w, sums = flat[0], flat[1], flat[2]
         for i in range(LANES):
             row = first + min(i, count - 1)
-            place[0, i], place[1, i], place[2, i] = x[row, 0], x[row, 1], x[row, 2]
+            here[0, i], here[1, i], here[2, i] = x[row, 0], x[row, 1], x[row, 2]
         for k in range(len(steps)):
             h = steps[k]
             moves, going = False, False
@@ -170,8 +187,8 @@ def march_lanes(x: Array, head: Array, moments: Array, steps: NDArray[np.float64
                 moment = 2 * k + (stage + 1) // 2
                 for a in range(3):
                     for i in range(LANES):
-                        at[a, i] = place[a, i] + share * v[a, i] if going else place[a, i]
-                going = _velocities(head, moments[moment], n, at, v, y, e, near, w, sums)
+                        at[a, i] = here[a, i] + share * v[a, i] if going else here[a, i]
+                going = _velocities(head, moments[moment], n, at, v, y, e, near, w, sums, nodes, place)
                 if going:
                     for a in range(3):
                         for i in range(LANES):
@@ -180,6 +197,6 @@ def march_lanes(x: Array, head: Array, moments: Array, steps: NDArray[np.float64
             if moves:
                 for a in range(3):
                     for i in range(LANES):
-                        place[a, i] += h / 6.0 * total[a, i]
+                        here[a, i] += h / 6.0 * total[a, i]
         for i in range(count):
-            x[first + i, 0], x[first + i, 1], x[first + i, 2] = place[0, i], place[1, i], place[2, i]
+            x[first + i, 0], x[first + i, 1], x[first + i, 2] = here[0, i], here[1, i], here[2, i]

@@ -2,7 +2,8 @@
 
 `head` holds the curve's number, r, the reach, the width of the outer cage's weight, whether the points'
 velocities differ, dc/dt [3], the six planes [6,4] (normal, offset) and dy/dt [n,3]. A row of `moments`, one
-for each knot and the middle of each step, holds c [3], F [9], F^-1 [9], dF/dt [9] and y [n,3]. Float64, as
+for each knot and the middle of each step, holds c [3], F [9], F^-1 [9], dF/dt [9], y [n,3] and t. `nodes`
+[X,Y,Z] are the detours of connected points, at `place` (see `kernels.detours`); none of others. Float64, as
 the oracle.
 """
 
@@ -13,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.compute.numba_cache import njit
-from cagefield.typing import Array
+from cagefield.typing import Array, Float32
 from cagefield.warps.control_point_motion import DISTANCE_POWER
 from cagefield.warps.falloff_curves import ROOT_END
+from cagefield.warps.kernels.detours import detour_slope
 
 PLANES, RATES = 8, 32
 INVERSE, SLOPE, PLACES = 12, 21, 30
@@ -50,7 +52,18 @@ def _curve(number: int, s: float) -> tuple[float, float]:
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def _velocity(head: Array, now: Array, n: int, x: Array, v: Array, G: Array, e: Array, eG: Array) -> bool:
+def _velocity(
+    head: Array,
+    now: Array,
+    n: int,
+    x: Array,
+    v: Array,
+    G: Array,
+    e: Array,
+    eG: Array,
+    nodes: Float32,
+    place: Array,
+) -> bool:
     """Write v [3] and dv/dx [3,3] at x [3]; False where nothing moves, and nothing is written.
 
     e [3] and eG [3,3] are room for the blend and its slope.
@@ -89,7 +102,6 @@ def _velocity(head: Array, now: Array, n: int, x: Array, v: Array, G: Array, e: 
             t0, t1, t2 = t0 + share * a0, t1 + share * a1, t2 + share * a2
     if d >= r:
         return False
-    w, slope = _curve(int(head[0]), 1.0 - d / r)
     for i in range(3):
         e[i] = head[RATES + i]
         eG[i, 0] = eG[i, 1] = eG[i, 2] = 0.0
@@ -114,6 +126,16 @@ def _velocity(head: Array, now: Array, n: int, x: Array, v: Array, G: Array, e: 
                 eG[i, 0] += left * a0
                 eG[i, 1] += left * a1
                 eG[i, 2] += left * a2
+    if len(nodes):
+        t = now[PLACES + 3 * n]
+        E, E0, E1, E2 = detour_slope(nodes, place, y0 - t * e[0], y1 - t * e[1], y2 - t * e[2])
+        d += E
+        if d >= r:
+            return False
+        t0 += E0 - t * (E0 * eG[0, 0] + E1 * eG[1, 0] + E2 * eG[2, 0])
+        t1 += E1 - t * (E0 * eG[0, 1] + E1 * eG[1, 1] + E2 * eG[2, 1])
+        t2 += E2 - t * (E0 * eG[0, 2] + E1 * eG[1, 2] + E2 * eG[2, 2])
+    w, slope = _curve(int(head[0]), 1.0 - d / r)
     u = 1.0
     u0, u1, u2 = 0.0, 0.0, 0.0
     if fade > 0.0:
@@ -155,7 +177,16 @@ def _velocity(head: Array, now: Array, n: int, x: Array, v: Array, G: Array, e: 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def _runge_kutta(
-    x: Array, J: Array, head: Array, moments: Array, m: int, h: float, n: int, room: Array
+    x: Array,
+    J: Array,
+    head: Array,
+    moments: Array,
+    m: int,
+    h: float,
+    n: int,
+    room: Array,
+    nodes: Float32,
+    place: Array,
 ) -> None:
     """One step of a point x [3] and its Jacobian J [3,3] from moment m on, in place; room [15,3]."""
     at, v, e = room[0], room[1], room[2]
@@ -170,7 +201,7 @@ def _runge_kutta(
         weight = 1.0 if stage == 0 or stage == 3 else 2.0
         at[0], at[1], at[2] = x[0] + share * k0, x[1] + share * k1, x[2] + share * k2
         moment = m if stage == 0 else m + 2 if stage == 3 else m + 1
-        if _velocity(head, moments[moment], n, at, v, G, e, eG):
+        if _velocity(head, moments[moment], n, at, v, G, e, eG, nodes, place):
             moves = True
             k0, k1, k2 = v[0], v[1], v[2]
             for a in range(3):
@@ -195,7 +226,15 @@ def _runge_kutta(
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", parallel=True)
-def march(x: Array, J: Array, head: Array, moments: Array, steps: NDArray[np.float64]) -> None:
+def march(
+    x: Array,
+    J: Array,
+    head: Array,
+    moments: Array,
+    steps: NDArray[np.float64],
+    nodes: Float32,
+    place: Array,
+) -> None:
     """Take points x [N,3] and Jacobians J [N,3,3] through `steps` [K], in place."""
     n = (moments.shape[1] - PLACES) // 3
     blocks = (len(x) + _BLOCK - 1) // _BLOCK
@@ -203,4 +242,4 @@ def march(x: Array, J: Array, head: Array, moments: Array, steps: NDArray[np.flo
         room = np.empty((15, 3))
         for row in range(block * _BLOCK, min(len(x), (block + 1) * _BLOCK)):
             for k in range(len(steps)):
-                _runge_kutta(x[row], J[row], head, moments, 2 * k, steps[k], n, room)
+                _runge_kutta(x[row], J[row], head, moments, 2 * k, steps[k], n, room, nodes, place)
