@@ -158,7 +158,7 @@ def test_pictures_show_the_other_slab_where_it_is() -> None:
         camera = ball_cameras(1, 0.0)[0]
         # From +x the slabs lie one behind the other: look from -y.
         camera = type(camera).look_at((0, -3, 0), (0, 0, 0), width=48, height=48, fov_x=0.9)
-        return np.asarray(scene.render(camera).alpha)
+        return np.asarray(scene.render(camera).opacity)
 
     plain = Edit.points([TIP], radius=0.8, relight="none").translate((0, 0, 0.2))
     connected = pull().replace(relight="none")

@@ -361,7 +361,7 @@ class Scene:
         That is a voxel's smallest edge, in the middle of the box of interest where the field is unbounded, or
         the width of most splats.
         """
-        edits = EditStack(self.patcher.with_detours(self.edits))
+        edits = EditStack(self.patcher.with_detours(self.edits.edits))
         return edits.lattice_errors(self.field.sample_spacing)
 
     def render(

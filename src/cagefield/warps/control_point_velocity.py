@@ -176,7 +176,7 @@ class ControlPointVelocity:
                 0.5 * ratios.sum(axis=(1, 2)), (1.0 + n ** (1.0 / BLEND_POWER)) * ratios.max(axis=(1, 2))
             )
         fade = self.planes.slope_bound(self.fade) if self.fade > 0.0 else 0.0
-        detour = 0.0
+        detour: Array | float = 0.0
         if self.inner.detours is not None:
             detour = self.inner.detours.slope_bound * (1.0 + BOUND_TIMES[1:] * blend)
         steepest = STEEPEST[self.inner.falloff] / motion.radius * inverse * (1.0 + detour) + fade

@@ -91,12 +91,4 @@ def with_reach(edit: Edit, radius: float | None, falloff: str | None) -> Edit:
     points = edit.inner
     if not isinstance(points, ControlPoints):
         raise edit.error("only control points have a radius; change the cage instead")
-    return edit.replace(
-        inner=ControlPoints(
-            points.points,
-            points.radius if radius is None else radius,
-            points.falloff if falloff is None else falloff,
-            pivot=points.pivot,
-            linear=points.linear,
-        )
-    )
+    return edit.replace(inner=points.with_reach(radius=radius, falloff=falloff))
