@@ -130,7 +130,7 @@ def _session_problem(folder: Path, said: int) -> str | None:
 
 
 def _free_form_problem(folder: Path, said: int) -> str | None:
-    """What is wrong after an edit of free-form shapes, all of which the scene holds itself."""
+    """Faults after an edit of free-form shapes, all of which the scene holds itself."""
     problem = scene_problem(folder, 0)
     if problem is not None or said < 1:
         return problem
