@@ -62,13 +62,51 @@ BLOCK_POINTS = 1 << 13
 
 
 @dataclass(frozen=True, eq=False)
+class PackedSplats:
+    """Visible splats [N] as kernels take them (`cagefield.fields.kernels.splat_mixture`).
+
+    visible [N]: their rows in the field; rows [N,14]; layers [N,4]: the thinnest axis over its scale, and
+    1 / (sqrt(2 pi) s_d); half [N,3]: half extents of the boxes around their ends, world units.
+    """
+
+    visible: NDArray[np.int64]
+    rows: Float32
+    layers: Float32
+    half: NDArray[np.float64]
+
+    @classmethod
+    def from_arrays(
+        cls, means: Float32, log_scales: Float32, quaternions: Float32, opacities: Float32
+    ) -> PackedSplats:
+        """Packed splats from the arrays of a `SplatField`."""
+        from cagefield.fields.kernels.splat_mixture import PACKED_FLOATS
+
+        visible = np.flatnonzero(opacities > MIN_RAY_OPACITY)
+        opacity = np.minimum(opacities[visible].astype(np.float64), MAX_OPACITY)
+        scales = np.exp(log_scales[visible].astype(np.float64))
+        rotations = rotation_matrices(quaternions[visible].astype(np.float64))
+        end = 2.0 * np.log(opacity / MIN_RAY_OPACITY)
+        half = np.sqrt(end[:, None] * np.einsum("nij,nj->ni", rotations**2, scales**2))
+        rows = np.empty((len(visible), PACKED_FLOATS), np.float32)
+        rows[:, :9] = (rotations.transpose(0, 2, 1) / scales[:, :, None]).reshape(-1, 9)
+        rows[:, 9:12] = means[visible]
+        rows[:, 12] = -np.log(opacity)
+        rows[:, 13] = end
+        thinnest = np.argmin(scales, axis=1)
+        layers = np.empty((len(visible), 4), np.float32)
+        layers[:, :3] = rows[:, :9].reshape(-1, 3, 3)[np.arange(len(visible)), thinnest]
+        layers[:, 3] = np.sqrt((scales**-2.0).mean(axis=1) / (2.0 * np.pi))
+        return cls(visible, rows, layers, half)
+
+
+@dataclass(frozen=True, eq=False)
 class SplatMixture:
     """Splats of a field in a hash table of cells, level by level: large splats in large cells.
 
     A splat whose box has the largest half extent r is in all the cells of size 2^l in [r, 2r) that it
-    overlaps, 27 at most. A query looks into one cell per level. `packed`, `layers` (for `grid_sigma`: the
-    thinnest axis over its scale, and 1 / (sqrt(2 pi) s_d)) and `harmonics` have a row per visible splat;
-    `cells` are the arrays of the table, as in `cagefield.fields.kernels.splat_mixture`.
+    overlaps, 27 at most. A query looks into one cell per level. `packed`, `layers` (as in `PackedSplats`)
+    and `harmonics` have a row per visible splat; `cells` are the arrays of the table, as in
+    `cagefield.fields.kernels.splat_mixture`.
     """
 
     packed: Float32
@@ -83,21 +121,8 @@ class SplatMixture:
         """Mixture of splats, from the arrays of a `SplatField`."""
         from cagefield.fields.kernels import splat_mixture as kernels
 
-        visible = np.flatnonzero(opacities > MIN_RAY_OPACITY)
-        opacity = np.minimum(opacities[visible].astype(np.float64), MAX_OPACITY)
-        scales = np.exp(log_scales[visible].astype(np.float64))
-        rotations = rotation_matrices(quaternions[visible].astype(np.float64))
-        end = 2.0 * np.log(opacity / MIN_RAY_OPACITY)
-        half = np.sqrt(end[:, None] * np.einsum("nij,nj->ni", rotations**2, scales**2))
-        packed = np.empty((len(visible), kernels.PACKED_FLOATS), np.float32)
-        packed[:, :9] = (rotations.transpose(0, 2, 1) / scales[:, :, None]).reshape(-1, 9)
-        packed[:, 9:12] = means[visible]
-        packed[:, 12] = -np.log(opacity)
-        packed[:, 13] = end
-        thinnest = np.argmin(scales, axis=1)
-        layers = np.empty((len(visible), 4), np.float32)
-        layers[:, :3] = packed[:, :9].reshape(-1, 3, 3)[np.arange(len(visible)), thinnest]
-        layers[:, 3] = np.sqrt((scales**-2.0).mean(axis=1) / (2.0 * np.pi))
+        splats = PackedSplats.from_arrays(means, log_scales, quaternions, opacities)
+        visible, packed, layers, half = splats.visible, splats.rows, splats.layers, splats.half
         largest = np.maximum(half.max(axis=1), MIN_CELL_SHARE * _extent(means[visible]))
         exponents, levels = np.unique(np.ceil(np.log2(largest)), return_inverse=True)
         sizes = np.exp2(exponents)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from cagefield.compute.cancellation import check_cancelled
 from cagefield.fields.sh import C0
 from cagefield.fields.splat_field import SplatField
-from cagefield.fields.splat_mixture import SplatMixture
+from cagefield.fields.splat_grid import SplatGrid
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.typing import Array, Mask
@@ -54,21 +54,11 @@ def voxelize_splats(splats: SplatField, box: Array, voxel: float) -> VoxelField:
     bounds = box.mean(axis=0) + 0.5 * voxel * (count - 1) * np.array([[-1.0], [1.0]])
     wide = _widen_splats(splats, bounds, voxel)
     covered = _covered_vertices(wide, bounds[0], voxel, count)
-    points = (bounds[0] + voxel * np.argwhere(covered)).astype(np.float32)
-    vertices = np.flatnonzero(covered)
-    density, sh = np.zeros(0, np.float32), np.zeros((0, 1, 3), np.float32)
-    if len(wide) and len(points):
-        mixture = SplatMixture.build(
-            wide.means, wide.log_scales, wide.quaternions, wide.opacities, wide.sh[:, :1]
-        )
-        density = mixture.grid_sigma(points)
-        is_stored = density * voxel > MIN_OPTICAL_DEPTH
-        density, vertices, points = density[is_stored], vertices[is_stored], points[is_stored]
-        up = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (len(points), 1, 1))
-        sh = ((mixture.evaluate(points, up)[1] - 0.5) / C0).astype(np.float32)
-    else:
-        vertices = vertices[:0]
-    return VoxelField(bounds, (int(count[0]), int(count[1]), int(count[2])), vertices, density, sh)
+    grid = SplatGrid(wide, bounds[0], voxel, (int(count[0]), int(count[1]), int(count[2])))
+    density = np.where(covered, grid.density(), np.float32(0.0))
+    is_stored = density * voxel > MIN_OPTICAL_DEPTH
+    sh = ((grid.colors(is_stored)[:, None] - 0.5) / C0).astype(np.float32)
+    return VoxelField(bounds, grid.count, np.flatnonzero(is_stored), density[is_stored], sh)
 
 
 def voxelize_bounds(splats: SplatField) -> VoxelField:
