@@ -225,14 +225,7 @@ class EditContext:
         """
         if not self.edit.uncovers or not len(self.removed.points):
             return np.zeros(len(self.light_surfels.points))
-        return _log_light_change(
-            model,
-            self.light_surfels,
-            [self.remaining],
-            [self.remaining, self.removed],
-            self.removed,
-            self.voxel,
-        )
+        return -_log_light_change(model, self.light_surfels, self.remaining, self.removed, self.voxel)
 
     def light_change_at_destination(
         self, under: GridBlock, footprint: Footprint | None, model: LightModel, strength: float
@@ -252,16 +245,14 @@ class EditContext:
         light_surfels = remaining.downsample(self.light_spacing)
         if self.pasted is not None:
             added = self.pasted.take(remaining.distance(self.pasted.points) > 0.5 * self.voxel)
-            log = _log_light_change(model, light_surfels, [remaining, added], [remaining], added, self.voxel)
+            log = _log_light_change(model, light_surfels, remaining, added, self.voxel)
             return LightChange.from_surfels(under, light_surfels, log, self.light_spacing), None
         part, moved = self._move(self.removed)
         # With its cut faces: the part is solid at its destination, not a shell.
         moved_solid = concatenate_surfels(
             [moved, self._move(extract_cut_faces(self.before, self.edit.inner))[1]]
         )
-        log = strength * _log_light_change(
-            model, light_surfels, [remaining, moved_solid], [remaining], moved_solid, self.voxel
-        )
+        log = strength * _log_light_change(model, light_surfels, remaining, moved_solid, self.voxel)
         change = LightChange.from_surfels(under, light_surfels, log, self.light_spacing)
         before = [self.surroundings, self.removed]
         log = model.log_light([remaining, moved_solid], moved) - model.log_light(before, part)
@@ -294,23 +285,18 @@ class EditContext:
 
 
 def _log_light_change(
-    model: LightModel,
-    surfels: Surfels,
-    after: Sequence[Surfels],
-    before: Sequence[Surfels],
-    difference: Surfels,
-    voxel: float,
+    model: LightModel, surfels: Surfels, around: Surfels, added: Surfels, voxel: float
 ) -> Array:
-    """Log ratio of the light [N] on surfels among the surfaces `after` to that among those `before`.
+    """Log ratio of the light [N] on surfels among `around` and `added` to that among `around` alone.
 
-    `difference` holds the surfels in which the two differ, which do not change openness far away.
+    `added` does not change openness far away.
     """
     near_rows = np.arange(len(surfels.points))
     if model.directional is None:
         near_rows = np.flatnonzero(
-            difference.distance(surfels.points, 2.0 * model.max_radius) < 2.0 * model.max_radius
+            added.distance(surfels.points, 2.0 * model.max_radius) < 2.0 * model.max_radius
         )
     rows, _ = snap_to_planes(surfels.take(near_rows), voxel, edges=True)
     log = np.zeros(len(surfels.points))
-    log[near_rows] = model.log_light(after, rows) - model.log_light(before, rows)
+    log[near_rows] = model.log_light_change(around, added, rows)
     return np.where(np.abs(log) < MIN_LOG_CHANGE, 0.0, log)

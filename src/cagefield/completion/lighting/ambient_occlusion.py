@@ -110,6 +110,26 @@ class LightModel:
             )
         return log
 
+    def log_light_change(self, around: Surfels, added: Surfels, surfels: Surfels) -> Array:
+        """Log ratio of the light [N] on surfels [N] among `around` and `added` to that among `around` alone.
+
+        Openness is evaluated only where `added` occludes.
+        """
+        check_cancelled()
+        log = np.zeros(len(surfels.points))
+        if sum(self.weights) > MIN_WEIGHT_SUM:
+            terms = added.occlusion_terms(surfels, self.radii)
+            rows = np.flatnonzero(terms.any(axis=1))
+            before = around.occlusion_terms(surfels.take(rows), self.radii)
+            log[rows] = self.log_openness(np.maximum(before, terms[rows])) - self.log_openness(before)
+        if self.directional is not None:
+            edge = SURFEL_CELL_SHARE * self.directional.near
+            for sign, surfaces in ((1.0, [around, added]), (-1.0, [around])):
+                log += sign * self.directional.log_light(
+                    build_distance_grid(surfaces, edge), surfels.points, surfels.normals
+                )
+        return log
+
     def log_diffuse(self, surfels: Surfels) -> Array:
         """Diffuse term [N] of `log_light`, a function of the normals of surfels [N]."""
         return (
