@@ -19,6 +19,7 @@ edits:
     inner: {center: [0.65, 0.5, -0.215], size: [0.34, 0.32, 0.36]}
     outer: {margin: 0.35}
     lattice: 32
+    relight: none
 """
 """The cone stands on the ground at z = -.4; its tip is at z = -.05."""
 

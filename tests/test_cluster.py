@@ -47,6 +47,7 @@ def run(*argv: object) -> None:
     assert main([str(arg) for arg in argv]) == 0
 
 
+@pytest.mark.nightly
 @needs_dask
 def test_frames_of_a_cluster_that_loses_a_worker_are_those_of_one_process(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -106,6 +106,7 @@ def test_a_paste_is_shown_moved_cropped_and_undone(server: EditorServer, render:
         assert page.state["edits"] == [] and greens(page.pixels()) == 0
 
 
+@pytest.mark.nightly
 def test_pastes_are_saved_as_their_scene_sees_them(root: Path, server: EditorServer) -> None:
     with editor_page(asking(server.link, "server"), 640, 460) as page:
         page.ready()
@@ -150,6 +151,7 @@ def test_a_scene_whose_paste_is_gone_opens_and_says_so(root: Path, tmp_path: Pat
         assert there == (problem is None) and (there or "is gone" in str(problem))
 
 
+@pytest.mark.nightly
 def test_splats_are_pasted_into_splats(root: Path) -> None:
     """By the server, also for a page that draws what else there is."""
     with (

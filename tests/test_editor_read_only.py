@@ -68,6 +68,7 @@ def tried(shown: EditorPage) -> None:
     )
 
 
+@pytest.mark.nightly
 def test_who_may_look_finds_nothing_that_edits(links: tuple[EditorServer, str]) -> None:
     server, link = links
     with editor_page(link, 1100, 760) as shown:

@@ -272,6 +272,7 @@ def test_parts_of_an_edit_that_are_impossible_are_named() -> None:
         ScenePage.build(scene, "lumps", keys)
 
 
+@pytest.mark.nightly
 def test_a_folder_shows_its_coarse_level_while_the_rest_loads(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -120,6 +120,7 @@ def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
         assert psnr(one, other) < 30.0
 
 
+@pytest.mark.nightly
 def test_the_more_splats_move_the_fewer_states_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = splats_scene(TURN)
     pose = tuple(scene.cameras["test"][0].c2w.ravel())
@@ -134,6 +135,7 @@ def test_the_more_splats_move_the_fewer_states_there_are(monkeypatch: pytest.Mon
     assert len(few.data) < 250_000 < len(many.data)
 
 
+@pytest.mark.nightly
 def test_a_folder_shows_its_coarse_level_while_the_rest_loads(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -204,6 +206,7 @@ def test_genuine_splats(tmp_path: Path) -> None:
         assert psnr(pixels(page), rendered(scene, seen[0], edits=False)) >= 40.0
 
 
+@pytest.mark.nightly
 def test_renderers_of_splats_that_are_opened_and_closed_leave_nothing() -> None:
     field = splats_scene(count=400).field
     edits = EditStack([TURN])
@@ -224,6 +227,7 @@ def test_renderers_of_splats_that_are_opened_and_closed_leave_nothing() -> None:
         assert seen == [seen[0]] * 4 and seen[0] <= 1
 
 
+@pytest.mark.nightly
 def test_a_page_of_many_splats_may_have_them_sorted_beside_it(tmp_path: Path) -> None:
     file = tmp_path / "scene.html"
     file.write_text(

@@ -118,6 +118,7 @@ def test_pictures_are_the_same_after_the_context_was_lost(page: FieldPage) -> No
     np.testing.assert_array_equal(before.rgb, after.rgb)
 
 
+@pytest.mark.nightly
 def test_what_is_closed_leaves_nothing_on_the_gpu(page: FieldPage) -> None:
     field = lumps(0, False, (17, 17, 17))
     edits = encode_page_edits(VoxelRenderer(field, EditStack([MOVED])))

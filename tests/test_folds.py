@@ -158,6 +158,7 @@ def test_a_fold_that_structure_from_motion_finds_too_is_kept_and_said(photos, tm
     assert "poses look folded" in said and "structure from motion finds the same poses" in said
 
 
+@pytest.mark.nightly
 def test_bundle_adjustment_that_stays_folded_confirms_no_fold(photos, tmp_path, monkeypatch):
     """Rough and folded poses: adjusted ones agree with them and are as folded; new ones are taken."""
     from cagefield.datasets.sfm import pose_verification

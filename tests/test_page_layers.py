@@ -150,6 +150,7 @@ def test_a_page_is_sent_layers_once(page: FieldPage) -> None:
     check_alike(twice.render(seen, normals=True), page.draw(seen))
 
 
+@pytest.mark.nightly
 def test_layers_are_there_after_the_context_was_lost_and_gone_with_their_edits(page: FieldPage) -> None:
     field, seen = lumps(1, False), camera(False)
     page.edit(None)
@@ -163,6 +164,7 @@ def test_layers_are_there_after_the_context_was_lost_and_gone_with_their_edits(p
     np.testing.assert_array_equal(plain.rgb, page.draw(seen).rgb)
 
 
+@pytest.mark.nightly
 def test_textures_grow_for_layers_up_to_the_memory(page: FieldPage) -> None:
     """Many edits, whose layers take more room than a field's textures have to spare."""
     field, seen = lumps(0, False), camera(False)

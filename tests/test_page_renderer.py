@@ -170,6 +170,7 @@ def test_splats_are_drawn_by_the_page(tmp_path: Path) -> None:
         assert filled(whole) < 0.75 * full and filled(own) < 0.85 * full
 
 
+@pytest.mark.nightly
 def test_discs_are_drawn_by_the_server(tmp_path: Path) -> None:
     scene = tmp_path / "discs"
     ball = splat_scene()

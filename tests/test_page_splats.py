@@ -341,6 +341,7 @@ def edited_unsplit(field: SplatField, edits: EditStack) -> bytes:
     return encode_page_splat_edits(field, changed_splats(field, edits))
 
 
+@pytest.mark.nightly
 def test_pictures_are_the_same_after_the_context_was_lost(page: FieldPage) -> None:
     field = splats(1)
     page.load(encode_page_splats(field))

@@ -219,6 +219,7 @@ def test_a_run_that_is_killed_leaves_no_digest(tmp_path: Path) -> None:
     assert not note.exists()
 
 
+@pytest.mark.nightly
 def test_a_database_that_may_not_be_written_says_what_helps(
     stopped: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -233,6 +234,7 @@ def test_a_database_that_may_not_be_written_says_what_helps(
     assert make_poses(folder / "photos", folder / "data").placed == 4
 
 
+@pytest.mark.nightly
 def test_a_folder_in_a_databases_place_is_moved_away(stopped: Path, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     shutil.copytree(stopped, folder)
@@ -280,6 +282,7 @@ def test_work_of_nobody_knows_what_is_left_alone(tmp_path: Path, content: bytes)
     assert (work / "made_of.json").read_bytes() == content
 
 
+@pytest.mark.nightly
 def test_work_of_other_photos_takes_as_much_as_that_of_these(tmp_path: Path) -> None:
     """Of many photos; all of their names and numbers were built, to see that they are."""
     work = tmp_path / "data.work"
@@ -314,6 +317,7 @@ def _most_memory(work: Callable[[], object]) -> int:
         tracemalloc.stop()
 
 
+@pytest.mark.nightly
 def test_a_model_that_is_cut_off_replaces_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """COLMAP does not notice that its disk is full."""
     photos, target = photos_alone(tmp_path / "photos"), tmp_path / "data"

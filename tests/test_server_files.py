@@ -342,6 +342,7 @@ def done(client: PageClient) -> dict[str, Any]:
     return client.until(lambda m: m["type"] == "job" and m["what"] == "splats" and m["state"] != "running")
 
 
+@pytest.mark.nightly
 def test_a_download_has_the_edits_in_it_and_the_page_that_asked_is_told(
     server: EditorServer, tmp_path: Path
 ) -> None:

@@ -108,6 +108,7 @@ VANISHING: list[Callable[[EditorServer, socket.socket], None]] = [
 ]
 
 
+@pytest.mark.nightly
 def test_peers_that_vanish_leave_no_trace(tmp_path: Path) -> None:
     ball_scene().save(tmp_path / "ball")
     with tempfile.TemporaryFile("w+") as errors, editor_server(tmp_path / "ball", errors=errors) as server:

@@ -286,6 +286,7 @@ def _renderer(server: EditorServer) -> int:
     return renderer
 
 
+@pytest.mark.nightly
 def test_pages_are_told_that_their_scene_was_replaced(tmp_path: Path) -> None:
     folder = tmp_path / "scene"
     splat_scene().save(folder)

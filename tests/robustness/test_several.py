@@ -130,6 +130,7 @@ def test_one_saves_while_another_drags(server: EditorServer, scene: Path) -> Non
         assert load_edits(scene / "edits.yaml")[0].operations == (Translate((0.3, 0, 0)),)
 
 
+@pytest.mark.nightly
 def test_a_second_server_says_who_has_the_scene_and_the_next_one_finds_all(scene: Path) -> None:
     command = [sys.executable, "-m", "cagefield", "view", str(scene), "--port", "0", "--no-browser"]
     with editor_server(scene) as first, page(first) as (client, _):
