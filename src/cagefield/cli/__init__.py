@@ -64,6 +64,7 @@ def parse(args: list[str]) -> Command | int:
     """The subcommand that `args` ask for, or an exit code: 0 after help, 2 after a complaint."""
     import tyro
 
+    from cagefield.cli.align import Align
     from cagefield.cli.bake import Bake
     from cagefield.cli.bench import Bench, bench_command
     from cagefield.cli.convert import Convert
@@ -94,6 +95,7 @@ def parse(args: list[str]) -> Command | int:
         | Annotated[View, tyro.conf.subcommand("view")]
         | Annotated[ApplyEdits, tyro.conf.subcommand("edit")]
         | Annotated[Select, tyro.conf.subcommand("select")]
+        | Annotated[Align, tyro.conf.subcommand("align")]
         | Annotated[Export, tyro.conf.subcommand("export")]
         | Annotated[Render, tyro.conf.subcommand("render")]
         | Annotated[Info, tyro.conf.subcommand("info")]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -100,9 +100,8 @@ class Export:
         self._check()
         from cagefield.compute import devices
         from cagefield.exporting import cages_of
-        from cagefield.scene.scene import Scene
 
-        scene = Scene.open(self.scene)
+        scene = self._opened(self.scene)
         if self.camera_path is not None or self.add or (_is_usd(self.out) and _pastes(scene)):
             return self._stage(scene)
         cages = () if self.selection is None else cages_of(self.selection, scene.edits)
@@ -178,7 +177,6 @@ class Export:
         from cagefield.exporting.path_frames import CameraPath
         from cagefield.exporting.sequences import frame_file, write_sequence
         from cagefield.files.atomic import check_writable
-        from cagefield.scene.scene import Scene
 
         if self.selection is not None or self.source_coordinates or self.add:
             raise CagefieldError(
@@ -187,7 +185,7 @@ class Export:
             )
         check_writable(frame_file(self.out, 0))
         path = CameraPath.load(self.camera_path or self.scene / "camera_path.json", self.fps)
-        scene = Scene.open(self.scene)
+        scene = self._opened(self.scene)
         devices.start(self.device)
         with progress_bar("Frames") as move:
             written, kept = write_sequence(
@@ -208,7 +206,6 @@ class Export:
         from cagefield.compute import devices
         from cagefield.exporting.path_frames import CameraPath
         from cagefield.exporting.usd_scenes import StageScene, write_scenes_usd
-        from cagefield.scene.scene import Scene
 
         if not _is_usd(self.out):
             raise CagefieldError(
@@ -222,7 +219,7 @@ class Export:
             )
         path = None if self.camera_path is None else CameraPath.load(self.camera_path, self.fps)
         folders = [self.scene, *self.add]
-        opened = [scene, *(Scene.open(folder) for folder in self.add)]
+        opened = [scene, *map(self._opened, self.add)]
         devices.start(self.device)
         with progress_bar("Splats") as move:
             info = write_scenes_usd(
@@ -236,6 +233,16 @@ class Export:
             )
         times = "" if info.fps is None else f", {info.frames} time samples at {info.fps:g} frames per second"
         print(f"prims: {', '.join(info.names)}; SH degree {info.sh_degree}{times}\nwritten to {self.out}")
+
+    def _opened(self, folder: Path) -> Scene:
+        """The scene of a folder; --up replaces its own up direction."""
+        from cagefield.scene.alignment import Alignment
+        from cagefield.scene.scene import Scene
+
+        scene = Scene.open(folder)
+        if self.up is None or scene.alignment.up is None:
+            return scene
+        return replace(scene, alignment=Alignment(scene.alignment.meters_per_unit))
 
     def _up(self, scene: Scene) -> Array:
         """Direction [3] that is up in a scene."""
@@ -270,7 +277,7 @@ class Export:
     def _splats(self, scene: Scene, cages: tuple[Cage, ...]) -> str:
         """Writes splats; a line of figures."""
         from cagefield.exporting import edited_splats, inside, upright
-        from cagefield.exporting.source_coordinates import splats_in_source, world_to_source
+        from cagefield.exporting.similarity import aligned_splats, transform_field, world_to_source
         from cagefield.fields.splat_field import SplatField
         from cagefield.formats.splats.splat_files import write_splats
         from cagefield.scene.import_splats import nearest_up
@@ -284,13 +291,15 @@ class Export:
             splats = splats.take(inside(cages, splats.means))
         line = f"{len(splats)} splats, SH degree {splats.sh_degree}; {figures}"
         if self.source_coordinates:
-            moved = splats_in_source(splats, world_to_source(scene))
+            moved = transform_field(splats, world_to_source(scene))
             write_splats(moved, self.out, self.axes, spz_version=self.spz_version)
             return f"{line}\nin the coordinates of the reconstruction"
         up = self._up(scene)
-        turned = upright(splats, up)
+        aligned = aligned_splats(splats, scene)
+        turned = upright(aligned, up)
         write_splats(turned, self.out, self.axes, spz_version=self.spz_version)
-        if turned is not splats:
+        line += _aligned(scene)
+        if turned is not aligned:
             line += f"\nturned upright from {nearest_up(up)}; --up y-down keeps the scene's coordinates"
         return line
 
@@ -318,7 +327,7 @@ class Export:
     def _mesh(self, scene: Scene, cages: tuple[Cage, ...]) -> str:
         """Writes a mesh; a line of figures."""
         from cagefield.exporting import inside, scene_mesh
-        from cagefield.exporting.source_coordinates import mesh_in_source, world_to_source
+        from cagefield.exporting.similarity import transform_mesh, world_to_aligned, world_to_source
         from cagefield.formats.mesh_files import write_mesh
 
         with progress_bar("Meshing") as move:
@@ -329,14 +338,17 @@ class Export:
         if self.source_coordinates:
             back = world_to_source(scene)
             up = back[:3, :3] @ up
-            mesh, offset = mesh_in_source(mesh, back)
+            mesh, offset = transform_mesh(mesh, back)
+        elif scene.alignment:
+            mesh, offset = transform_mesh(mesh, world_to_aligned(scene))
         write_mesh(self.out, mesh, up, offset=offset)
-        return f"{len(mesh.faces)} triangles, {len(mesh.positions)} vertices with colours"
+        aligned = "" if self.source_coordinates else _aligned(scene)
+        return f"{len(mesh.faces)} triangles, {len(mesh.positions)} vertices with colours{aligned}"
 
     def _points(self, scene: Scene, cages: tuple[Cage, ...]) -> str:
         """Writes points; a line of figures."""
         from cagefield.exporting import MAX_FITTED_SPLATS, inside, scene_points
-        from cagefield.exporting.source_coordinates import points_in_source, world_to_source
+        from cagefield.exporting.similarity import transform_points, world_to_aligned, world_to_source
         from cagefield.formats.mesh_files import write_points
 
         with stages() as move:
@@ -347,9 +359,20 @@ class Export:
             points = points.take(np.flatnonzero(inside(cages, points.positions)))
         offset = scene.offset
         if self.source_coordinates:
-            points, offset = points_in_source(points, world_to_source(scene))
+            points, offset = transform_points(points, world_to_source(scene))
+        elif scene.alignment:
+            points, offset = transform_points(points, world_to_aligned(scene))
         write_points(self.out, points.positions, points.rgb, points.normals, offset=offset)
-        return f"{len(points)} points with normals and colours"
+        aligned = "" if self.source_coordinates else _aligned(scene)
+        return f"{len(points)} points with normals and colours{aligned}"
+
+
+def _aligned(scene: Scene) -> str:
+    """A line of figures of the scene's alignment, after a line break; empty without any."""
+    scale, up = scene.alignment.meters_per_unit, scene.alignment.up
+    parts = [] if scale is None else [f"in meters ({scale:.6g} m per unit of the scene)"]
+    parts += [] if up is None else ["leveled by the scene's up direction"]
+    return "\n" * bool(parts) + ", ".join(parts)
 
 
 def _is_usd(path: Path) -> bool:

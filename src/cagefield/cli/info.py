@@ -26,6 +26,7 @@ class Info:
 
     def run(self) -> None:
         """Prints one line per fact."""
+        from cagefield.cli.align import describe_alignment
         from cagefield.cli.dataset_report import describe_world
         from cagefield.cli.report import describe_edits
         from cagefield.fields.splat_field import SplatField
@@ -60,6 +61,8 @@ class Info:
             print(f"cameras     {split}: {len(cameras)} {', '.join(sizes)}".rstrip())
         if world := describe_world(scene.source_to_world):
             print(f"world       {world}; export --source-coordinates undoes it")
+        if scene.alignment:
+            print("\n".join(describe_alignment(scene.alignment, scene)))
         if scene.gains:
             low, high = (choose(map(choose, scene.gains)) for choose in (min, max))
             print(f"exposure    gains of {len(scene.gains)} training photos, from {low:.3f} to {high:.3f}")

@@ -29,6 +29,7 @@ from cagefield.completion.splat_patch import (
 )
 from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.splat_voxelization import voxelize_bounds
+from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.completion.surfaces.visibility import CameraVisibility, render_visibility
 from cagefield.compute.cancellation import cancellable, check_cancelled
 from cagefield.edits import Continuous, Delete, Discrete, Edit, Paste, PreparedEdit, PreparedStack
@@ -247,6 +248,11 @@ class Patcher:
         )
         self._images.clear()
         return visibility
+
+    @property
+    def visible_surfels(self) -> Surfels:
+        """Surfels of the field's surfaces that its cameras see, canonical space."""
+        return self._visibility.surface
 
     def _image(self, camera: Camera) -> RenderResult:
         key = camera.c2w.tobytes(), camera.fx, camera.fy, camera.width, camera.height

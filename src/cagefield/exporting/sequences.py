@@ -9,6 +9,7 @@ from pathlib import Path
 from cagefield.errors import CagefieldError
 from cagefield.exporting import upright
 from cagefield.exporting.path_frames import CameraPath, splats_at
+from cagefield.exporting.similarity import aligned_splats
 from cagefield.formats.splats.axes import Axes
 from cagefield.formats.splats.splat_files import find_writer, write_splats
 from cagefield.formats.splats.spz_writer import Version as SpzVersion
@@ -47,7 +48,8 @@ def write_sequence(
 ) -> tuple[int, int]:
     """Write the edited splats of each frame of a path, numbered from 0; (written, kept) numbers of files.
 
-    `pattern` is a name with %d or %04d. Splats are turned upright from `up` [3]. Files that are there are
+    `pattern` is a name with %d or %04d. Splats are aligned as the scene is, and
+    turned upright from `up` [3]. Files that are there are
     kept unless `overwrite` is set: an interrupted export goes on where it ended. Each file is complete or not
     there. Memory holds one frame.
 
@@ -63,7 +65,7 @@ def write_sequence(
         if file.exists() and not overwrite:
             kept += 1
         else:
-            splats = upright(splats_at(scene, still.parts), up)
+            splats = upright(aligned_splats(splats_at(scene, still.parts), scene), up)
             write_splats(splats, file, axes, spz_version=spz_version)
             written += 1
         on_progress((number + 1) / len(stills), f"{number + 1}/{len(stills)}")

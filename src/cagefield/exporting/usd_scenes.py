@@ -16,6 +16,7 @@ from cagefield.edits import Paste
 from cagefield.errors import CagefieldError
 from cagefield.exporting import upright, upright_turn
 from cagefield.exporting.path_frames import IMAGE_SIZE, CameraPath, scene_at
+from cagefield.exporting.similarity import aligned_splats
 from cagefield.fields.splat_field import Offset, SplatField
 from cagefield.formats.splats.axes import PLY_AXES, ConvertedTable, axis_signs
 from cagefield.formats.splats.splat_table import FieldTable, SplatTable
@@ -40,8 +41,9 @@ class StageScene:
 
     @property
     def to_stage(self) -> Array:
-        """Rotation [3,3] from the scene's axes to the stage's."""
-        return np.diag(axis_signs(PLY_AXES, USD_AXES)) @ upright_turn(self.up)
+        """Rotation times scale [3,3] from the scene's coordinates to the stage's, which are aligned."""
+        aligned = self.scene.alignment.matrix[:3, :3]
+        return np.asarray(np.diag(axis_signs(PLY_AXES, USD_AXES)) @ upright_turn(self.up) @ aligned)
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -130,7 +132,9 @@ def _frames(
 
 def _tables(one: StageScene, scene: Scene, sh_degree: int) -> dict[str, SplatTable]:
     return {
-        name: ConvertedTable(FieldTable(upright(splats, one.up)), USD_AXES, sh_degree)
+        name: ConvertedTable(
+            FieldTable(upright(aligned_splats(splats, one.scene), one.up)), USD_AXES, sh_degree
+        )
         for name, splats in edited_parts(scene).items()
     }
 

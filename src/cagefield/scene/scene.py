@@ -50,6 +50,7 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.files.atomic import replaced_file, replaced_folder
 from cagefield.files.safe_open import real_path
 from cagefield.images.render_result import Background, RenderResult, background_rgb
+from cagefield.scene.alignment import Alignment
 from cagefield.scene.paste_sources import SceneSources
 from cagefield.scene.removed_elements import Removal, dump_removed, read_removed, without_removed
 from cagefield.scene.scene_files import (
@@ -106,7 +107,8 @@ class Scene:
     opened from: sources of pastes are relative to that, or to the working directory where it is None.
     `source_to_world` [4,4] maps the coordinates of the reconstruction that the cameras came from to the
     scene's (`Dataset.source_to_world`); the identity where they are the same or nothing is known.
-    `removal` has the whole field, which is saved, where `field` is without deleted elements.
+    `removal` has the whole field, which is saved, where `field` is without deleted elements. `alignment` has
+    the meters per unit and the up direction that exports honor.
 
     Raises:
         CagefieldError: a background outside [0, 1].
@@ -125,6 +127,7 @@ class Scene:
     folder: Path | None = None
     source_to_world: Array = dataclasses.field(default_factory=partial(np.eye, 4))
     removal: Removal | None = None
+    alignment: Alignment = dataclasses.field(default_factory=Alignment)
 
     def __post_init__(self) -> None:
         cameras = {str(split): tuple(members) for split, members in self.cameras.items()}
@@ -220,7 +223,7 @@ class Scene:
         if not folder.is_dir():
             what = "is a file, not a folder" if folder.exists() else "does not exist"
             raise SceneError(f"scene {folder} {what}; give the folder that `cagefield train -o` wrote")
-        background, gains, preserve_opacity, source_to_world = read_manifest(folder)
+        manifest = read_manifest(folder)
         for name in (FIELD, CAMERAS, EDITS):
             check_part(folder / name)
         cameras = read_cameras(folder / CAMERAS)
@@ -239,13 +242,14 @@ class Scene:
                 field,
                 edits,
                 cameras,
-                background,
-                gains=gains,
+                manifest.background,
+                gains=manifest.gains,
                 original=original,
-                preserve_opacity=preserve_opacity,
+                preserve_opacity=manifest.preserve_opacity,
                 folder=folder.absolute(),
-                source_to_world=np.eye(4) if source_to_world is None else source_to_world,
+                source_to_world=np.eye(4) if manifest.source_to_world is None else manifest.source_to_world,
                 removal=removal,
+                alignment=manifest.alignment,
             )
         except SceneError as error:
             raise SceneError(f"{folder / MANIFEST}: {error}") from None
@@ -303,6 +307,8 @@ class Scene:
             manifest["preserve_opacity"] = False
         if not np.array_equal(self.source_to_world, np.eye(4)):
             manifest["source_to_world"] = self.source_to_world.tolist()
+        if self.alignment:
+            manifest["alignment"] = self.alignment.to_dict()
         with replaced_file(folder / MANIFEST, parents=False) as draft:
             write_json(manifest, draft)
             yield
@@ -473,7 +479,9 @@ class Scene:
 
     @cached_property
     def up(self) -> Array:
-        """The unit direction [3] that is up for the scene's cameras; z where it has none."""
+        """The unit direction [3] that is up: the alignment's, else the cameras'; z without either."""
+        if self.alignment.up is not None:
+            return self.alignment.up
         poses = [camera.c2w for group in self.cameras.values() for camera in group]
         return shared_up(np.stack(poses)) if poses else np.array([0.0, 0.0, 1.0])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from cagefield.cameras.camera import Camera
 from cagefield.errors import CagefieldError, SceneError
@@ -27,6 +27,7 @@ from cagefield.files.safe_open import (
     real_path,
 )
 from cagefield.images.render_result import background_rgb
+from cagefield.scene.alignment import Alignment
 
 FORMAT = "cagefield-scene"
 VERSION = 1
@@ -103,8 +104,18 @@ def check_part(path: Path) -> None:
         raise SceneError(f"{path} cannot be read ({error.strerror}); {cure}") from None
 
 
-def read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any, bool, Any]:
-    """Background, gains, unchecked, the opacity choice, and source_to_world, unchecked, None without."""
+class Manifest(NamedTuple):
+    """Values of a manifest; gains and source_to_world (None without) are unchecked."""
+
+    background: tuple[float, float, float] | None
+    gains: Any
+    preserve_opacity: bool
+    source_to_world: Any
+    alignment: Alignment
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """The values of a scene's manifest. Raises SceneError where it is missing, damaged or newer."""
     path = folder / MANIFEST
     if not path.exists():
         raise SceneError(
@@ -130,7 +141,12 @@ def read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any,
         background = background_rgb(document.get("background"))
     except (CagefieldError, TypeError, ValueError) as error:
         raise SceneError(f"{path}: {error!s:.200}") from None
-    return background, document.get("gains", ()), opacity, document.get("source_to_world")
+    try:
+        alignment = Alignment.from_value(document.get("alignment", {}))
+    except SceneError as error:
+        raise SceneError(f"{path}: {error}; correct or remove the entry in the file") from None
+    gains = document.get("gains", ())
+    return Manifest(background, gains, opacity, document.get("source_to_world"), alignment)
 
 
 def read_field(path: Path) -> VoxelField | SplatField:

@@ -138,9 +138,9 @@ def prim_names(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def camera_pose(camera: Camera, to_stage: Array) -> Pose:
-    """Pose of a camera; `to_stage` [3,3] is the rotation from its world to the stage's axes."""
+    """Pose of a camera; `to_stage` [3,3] is rotation times scale from its world to the stage's axes."""
     matrix = np.eye(4)
-    matrix[:3, :3] = to_stage @ camera.c2w[:3, :3]
+    matrix[:3, :3] = to_stage @ camera.c2w[:3, :3] / np.cbrt(np.linalg.det(to_stage))
     matrix[:3, 3] = to_stage @ camera.c2w[:3, 3]
     return Pose(matrix, APERTURE_MM * camera.fy / camera.height)
 

@@ -140,6 +140,7 @@ def write_edited(
     import dataclasses
 
     from cagefield.exporting import edited_splats, upright
+    from cagefield.exporting.similarity import aligned_splats
     from cagefield.formats.splats.splat_files import write_splats
     from cagefield.scene.removed_elements import without_removed
     from cagefield.scene.scene import Scene
@@ -151,7 +152,7 @@ def write_edited(
         dataclasses.replace(opened, field=field, edits=stack, preserve_opacity=preserve_opacity)
     )
     Path(out).parent.mkdir(parents=True, exist_ok=True)
-    write_splats(upright(splats, opened.up), out)
+    write_splats(upright(aligned_splats(splats, opened), opened.up), out)
     return len(splats)
 
 

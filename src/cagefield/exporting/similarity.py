@@ -1,8 +1,9 @@
-"""Splats, meshes and points in the coordinates of the reconstruction that a scene's cameras came from.
+"""Splats, meshes and points under a similarity: aligned with the world, or as the reconstruction had them.
 
 Notation: a scene's `source_to_world` is x' = M x + t, M a similarity's matrix (rotation times scale, perhaps
-mirrored). Its inverse is applied in float64. The distance of the result from the
-origin, too large for float32, becomes an offset.
+mirrored); its inverse leads to the coordinates of the reconstruction that the cameras came from. A scene's
+`alignment` leads to meters and to an axis that is up. Both are applied in float64. The distance of the result
+from the origin, too large for float32, becomes an offset.
 """
 
 from __future__ import annotations
@@ -51,26 +52,48 @@ def world_to_source(scene: Scene) -> FloatArray:
     return np.asarray(np.linalg.inv(matrix), np.float64)
 
 
-def splats_in_source(splats: SplatField, back: FloatArray) -> SplatField:
+def world_to_aligned(scene: Scene) -> FloatArray:
+    """The similarity [4,4] from the scene's coordinates, without its offset, to aligned ones."""
+    matrix = scene.alignment.matrix
+    matrix[:3, 3] = matrix[:3, :3] @ np.array(scene.offset)
+    return matrix
+
+
+def aligned_splats(splats: SplatField, scene: Scene) -> SplatField:
+    """Splats of a scene in aligned coordinates, as their offset is; themselves without alignment."""
+    if not scene.alignment:
+        return splats
+    matrix = scene.alignment.matrix
+    means, found = _transformed(splats, matrix)
+    x, y, z = (matrix[:3, :3] @ np.array(splats.offset) + 0.0).tolist()
+    return replace(found, means=means.astype(np.float32), offset=(x, y, z))
+
+
+def transform_field(splats: SplatField, back: FloatArray) -> SplatField:
     """The splats under a similarity [4,4]: means moved, scales scaled, harmonics turned.
 
     The field's own offset is left out of it: `back` has it.
     """
+    means, found = _transformed(splats, back)
+    means, offset = _near_origin(means)
+    return replace(found, means=means.astype(np.float32), bounds=found.bounds - offset, offset=offset)
+
+
+def _transformed(splats: SplatField, matrix: FloatArray) -> tuple[FloatArray, SplatField]:
+    """(means [N,3] under a similarity [4,4], splats with all but their means and offset under it)."""
     batch = SplatBatch(splats.means, splats.log_scales, splats.quaternions, splats.opacities, splats.sh)
-    found = transform_splats(batch, back)
-    means, offset = _near_origin(found.means.astype(np.float64))
-    return replace(
+    found = transform_splats(batch, matrix)
+    field = replace(
         splats,
-        means=means.astype(np.float32),
         log_scales=found.log_scales.astype(np.float32),
         quaternions=found.quaternions.astype(np.float32),
         sh=found.sh,
-        bounds=_box(splats.bounds, back) - offset,
-        offset=offset,
+        bounds=_box(splats.bounds, matrix),
     )
+    return found.means.astype(np.float64), field
 
 
-def mesh_in_source(mesh: Mesh, back: FloatArray) -> tuple[Mesh, Offset]:
+def transform_mesh(mesh: Mesh, back: FloatArray) -> tuple[Mesh, Offset]:
     """(the mesh under a similarity [4,4] less an offset, the offset)."""
     positions, offset = _near_origin(_moved(mesh.positions, back))
     is_mirrored = np.linalg.det(back[:3, :3]) < 0.0
@@ -79,7 +102,7 @@ def mesh_in_source(mesh: Mesh, back: FloatArray) -> tuple[Mesh, Offset]:
     return moved, offset
 
 
-def points_in_source(points: SurfacePoints, back: FloatArray) -> tuple[SurfacePoints, Offset]:
+def transform_points(points: SurfacePoints, back: FloatArray) -> tuple[SurfacePoints, Offset]:
     """(the points under a similarity [4,4] less an offset, the offset)."""
     positions, offset = _near_origin(_moved(points.positions, back))
     return replace(points, positions=positions, normals=_turned(points.normals, back)), offset

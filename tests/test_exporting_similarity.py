@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.datasets import load_dataset
 from cagefield.errors import CagefieldError, SceneError
-from cagefield.exporting.source_coordinates import mesh_in_source, points_in_source, splats_in_source
+from cagefield.exporting.similarity import transform_field, transform_mesh, transform_points
 from cagefield.fields.meshing import Mesh
 from cagefield.fields.sh import sh_basis
 from cagefield.fields.splat_field import SplatField
@@ -53,7 +53,7 @@ def test_splats_are_those_of_the_reconstruction(mirror):
     """x = M^-1 (x' - t); covariances M^-1 C M^-T; a color seen along d is seen along P^-1 d."""
     field = random_splats(40, degree=3)
     turn = TURN @ mirror
-    found = splats_in_source(field, np.linalg.inv(similarity(turn)))
+    found = transform_field(field, np.linalg.inv(similarity(turn)))
     np.testing.assert_allclose(found.means, (field.means - SHIFT) @ turn / SCALE, atol=1e-4)
     expected = turn.T @ covariances(field) @ turn / SCALE**2
     np.testing.assert_allclose(covariances(found), expected, rtol=1e-4, atol=1e-5 * expected.max())
@@ -67,7 +67,7 @@ def test_splats_are_those_of_the_reconstruction(mirror):
 def test_far_reconstructions_get_an_offset():
     field = random_splats(40)
     far = np.array([500123.25, 5412345.5, 312.0])
-    found = splats_in_source(field, similarity(TURN, 2.0, far))
+    found = transform_field(field, similarity(TURN, 2.0, far))
     places = 2.0 * field.means.astype(float) @ TURN.T + far
     np.testing.assert_allclose(found.means.astype(float) + found.offset, places, atol=1e-5)
     assert np.abs(found.means).max() < 30
@@ -81,7 +81,7 @@ def test_meshes_and_points_too(mirror):
     rgb = np.full((3, 3), 0.5, np.float32)
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
     normals = np.tile(np.float32([0, 0, 1]), (3, 1))
-    mesh, offset = mesh_in_source(Mesh(corners, normals, rgb, np.array([[0, 1, 2]], np.int32)), back)
+    mesh, offset = transform_mesh(Mesh(corners, normals, rgb, np.array([[0, 1, 2]], np.int32)), back)
     assert not any(offset)
     moved = 3.0 * corners @ (TURN @ mirror).T + SHIFT
     np.testing.assert_allclose(mesh.positions, moved, atol=1e-5)
@@ -89,7 +89,7 @@ def test_meshes_and_points_too(mirror):
     # Faces stay counter-clockwise seen from where normals point to.
     np.testing.assert_allclose(np.cross(b - a, c - a) / 9.0, mesh.normals[0], atol=1e-5)
     np.testing.assert_allclose(mesh.normals[0], TURN @ mirror @ (0, 0, 1), atol=1e-6)
-    points, _ = points_in_source(SurfacePoints(corners.astype(float), normals, rgb), back)
+    points, _ = transform_points(SurfacePoints(corners.astype(float), normals, rgb), back)
     np.testing.assert_allclose(points.positions, moved, atol=1e-12)
     np.testing.assert_allclose(points.normals[0], TURN @ mirror @ (0, 0, 1), atol=1e-6)
 
@@ -185,7 +185,7 @@ def test_damaged_similarities_are_refused(tmp_path, value):
 
 
 def test_a_map_that_is_no_similarity_is_refused():
-    from cagefield.exporting.source_coordinates import world_to_source
+    from cagefield.exporting.similarity import world_to_source
 
     scene = dataclasses.replace(splat_scene(), source_to_world=np.diag([1.0, 2.0, 3.0, 1.0]))
     with pytest.raises(CagefieldError, match="scales axes by 3 to 1"):
