@@ -1,4 +1,4 @@
-"""`cagefield align`: meters per unit and the up direction of a scene, which exports honor."""
+"""`cagefield align`: meters per unit and the up direction of a scene, and pastes aligned with it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ FLOOR = "floor"
 class Align:
     """Set the scale of a scene in meters, and its up direction; exports and pages honor both.
 
-    Field, cameras and edits keep their coordinates. Without an option the present alignment is printed.
+    Field, cameras and edits keep their coordinates. Without an option the present alignment is printed. With
+    --paste an edit that pastes another scene is aligned with this one instead.
     """
 
     scene: tyro.conf.Positional[Path]
@@ -39,10 +40,23 @@ class Align:
     plane that is level."""
     reset: Flag = False
     """Remove scale and up direction."""
+    paste: str | None = None
+    """Name of an edit that pastes: its operations are replaced by those that align it."""
+    pairs: Annotated[tuple[str, ...], tyro.conf.arg(metavar="X,Y,Z...")] = ()
+    """Pairs of points for --paste, three at least: each a point of the other scene, then that of this scene
+    where it belongs."""
+    refine: Flag = False
+    """Bring the surfaces of both scenes nearer after the pairs (iterative closest points)."""
+    keep_scale: Flag = False
+    """Leave the scale that the pairs give."""
     device: Device = "auto"
 
     def run(self) -> None:
-        """Check the options, write the scene's manifest, print the alignment."""
+        """Check the options, write the scene's manifest or edits, print the alignment."""
+        if self.paste is not None:
+            return self._align_paste(self.paste)
+        if self.pairs or self.refine or self.keep_scale:
+            raise CagefieldError("--pairs, --refine and --keep-scale are for --paste; give its edit's name")
         from cagefield.scene.alignment import Alignment, meters_per_unit
         from cagefield.scene.scene import Scene
 
@@ -64,6 +78,37 @@ class Align:
         if changes or self.reset:
             dataclasses.replace(scene, alignment=alignment).save_manifest(self.scene)
         print("\n".join(describe_alignment(alignment, scene)))
+
+    def _align_paste(self, name: str) -> None:
+        """Align a paste, write the scene's edits, and print how well it fits."""
+        from cagefield.edits import EditStack, Paste
+        from cagefield.scene.paste_alignment import align_paste
+        from cagefield.scene.scene import Scene
+
+        if self.reset or (self.distance, self.meters_per_unit, self.up) != (None, None, None):
+            raise CagefieldError("--paste aligns an edit; set scale and up direction by themselves")
+        if len(self.pairs) < 6 or len(self.pairs) % 2:
+            raise CagefieldError(
+                f"--pairs has {len(self.pairs)} points; give three pairs or more, each a point of the other "
+                "scene and the point of this scene where it belongs"
+            )
+        scene = Scene.open(self.scene, whole=True)
+        found = [edit for edit in scene.edits if edit.name == name]
+        if len(found) != 1 or not isinstance(found[0], Paste):
+            names = ", ".join(f'"{edit.name}"' for edit in scene.edits if isinstance(edit, Paste))
+            raise CagefieldError(f'"{name}" is no paste of this scene; its pastes are: {names or "none"}')
+        points = [_numbers(text) for text in self.pairs]
+        aligned = align_paste(
+            scene, found[0], points[::2], points[1::2], refine=self.refine, keep_scale=self.keep_scale
+        )
+        stack = EditStack([aligned.edit if edit is found[0] else edit for edit in scene.edits])
+        stack.check()
+        scene.with_edits(stack).save(self.scene, overwrite=True)
+        print(f"pairs       {aligned.residual:.4g} apart (root mean square, units of the scene)")
+        if (fit := aligned.refinement) is not None:
+            print(f"surfaces    {fit.distance:.4g} apart (median), {fit.distance_before:.4g} before")
+        for operation in aligned.edit.operations:
+            print(f"{operation.noun:<12}{operation}")
 
     def _direction(self, scene: Scene) -> Array:
         """The up direction [3] of --up."""

@@ -144,8 +144,8 @@ def dominant_plane(
     """The plane with the most surfels that faces a direction `toward` [3]; None where none does.
 
     points, normals [N,3]: the surfels; spacing: the field's `sample_spacing`, world units. Planes tilted by
-    more than MAX_TILT_DEGREES from `toward`, as walls are, or with less than MIN_PLANE_SHARE of the surfels do
-    not count.
+    more than MAX_TILT_DEGREES from `toward`, as walls are, or with less than MIN_PLANE_SHARE of the surfels
+    do not count.
     """
     toward = np.asarray(toward, np.float64)
     rng = np.random.default_rng(seed)

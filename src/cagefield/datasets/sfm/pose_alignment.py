@@ -9,10 +9,10 @@ Source: Hartley et al., "L1 rotation averaging using the Weiszfeld algorithm" (2
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
+
+from cagefield.geometry.point_alignment import Similarity
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -23,26 +23,6 @@ MAX_MEDIAN_OFFSET = 0.3
 """Maximum median offset between aligned positions of poses that agree, over the positions' spread."""
 
 MAX_ITERATIONS = 50
-
-
-@dataclass(frozen=True, eq=False)
-class Similarity:
-    """Map x -> scale rotation x + translation; rotation [3,3], translation [3]."""
-
-    scale: float
-    rotation: FloatArray
-    translation: FloatArray
-
-    def transform_points(self, points: FloatArray) -> FloatArray:
-        """Points [N,3] mapped by the similarity."""
-        return np.asarray(self.scale * (points @ self.rotation.T) + self.translation)
-
-    def transform_pose(self, c2w: FloatArray) -> FloatArray:
-        """Camera-to-world pose [4,4] mapped by the similarity, without scale in its rotation."""
-        pose = np.eye(4)
-        pose[:3, :3] = self.rotation @ c2w[:3, :3]
-        pose[:3, 3] = self.transform_points(c2w[None, :3, 3])[0]
-        return pose
 
 
 def align_poses(poses: FloatArray, target: FloatArray) -> Similarity | None:

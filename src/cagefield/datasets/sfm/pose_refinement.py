@@ -30,10 +30,11 @@ from cagefield.datasets.sfm import features, triangulation
 from cagefield.datasets.sfm.epipolar_error import SEQUENCE_STEPS
 from cagefield.datasets.sfm.features import OnProgress, Photo
 from cagefield.datasets.sfm.matching import match
-from cagefield.datasets.sfm.pose_alignment import Similarity, align_poses
+from cagefield.datasets.sfm.pose_alignment import align_poses
 from cagefield.datasets.sfm.registration_report import verified_matches
 from cagefield.datasets.sfm.structure_from_motion import MAX_EXHAUSTIVE_PHOTOS, model_camera, reconstruct
 from cagefield.datasets.views import SparsePoints, View
+from cagefield.geometry.point_alignment import Similarity
 
 FloatArray = npt.NDArray[np.float64]
 

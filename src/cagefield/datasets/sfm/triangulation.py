@@ -26,9 +26,9 @@ from cagefield.cameras.camera import Camera
 from cagefield.datasets.sfm import features
 from cagefield.datasets.sfm.features import OnProgress, Photo
 from cagefield.datasets.sfm.matching import match
-from cagefield.datasets.sfm.pose_alignment import Similarity
 from cagefield.datasets.views import SparsePoints, View
 from cagefield.files.temporary_folders import TemporaryFolder
+from cagefield.geometry.point_alignment import Similarity
 
 FloatArray = npt.NDArray[np.float64]
 
