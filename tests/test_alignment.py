@@ -223,3 +223,14 @@ def test_splats_without_alignment_are_themselves() -> None:
     far = dataclasses.replace(splats, offset=(10.0, 0.0, -4.0))
     assert aligned_splats(far, scene).offset == (20.0, 0.0, -8.0)
     assert aligned_splats(splats, dataclasses.replace(scene, alignment=Alignment())) is splats
+
+
+def test_an_aligned_source_is_pasted_upright(tmp_path: Path) -> None:
+    scene = dataclasses.replace(splat_scene(), edits=EditStack())
+    scene.save(tmp_path / "scene")
+    dataclasses.replace(scene, alignment=Alignment(up=TILTED)).save(tmp_path / "other")
+    paste = Scene.open(tmp_path / "scene").paste("../other")
+    edges = paste.deformed.corners - paste.deformed.corners[0]
+    before = paste.inner.corners - paste.inner.corners[0]
+    turn = np.linalg.lstsq(before, edges, rcond=None)[0].T
+    np.testing.assert_allclose(turn @ TILTED, scene.up, atol=1e-6)

@@ -40,11 +40,17 @@ class SourceLook:
     up: Array
 
 
+def up_of_cameras(cameras: Mapping[str, tuple[Camera, ...]]) -> Array:
+    """The unit direction [3] that is up for cameras by split; z without any."""
+    poses = [camera.c2w for group in cameras.values() for camera in group]
+    return shared_up(np.stack(poses)) if poses else np.array([0.0, 0.0, 1.0])
+
+
 class OpenedScene(Protocol):
     """Protocol of an opened source scene."""
 
     @property
-    def cameras(self) -> Mapping[str, tuple[Camera, ...]]: ...
+    def up(self) -> Array: ...
 
     @property
     def field(self) -> VoxelField | SplatField: ...
@@ -106,13 +112,11 @@ class SceneSources:
         path = self._path(source)
         if is_scene(path):
             scene = self._open(path, self._pasting)
-            other, cameras = scene.field, scene.cameras
+            other, up = scene.field, scene.up
         else:
             imported = imported_splats(path)
-            other, cameras = imported.field, imported.cameras
+            other, up = imported.field, up_of_cameras(imported.cameras)
         check_kinds(other, field)
-        poses = [camera.c2w for group in cameras.values() for camera in group]
-        up = shared_up(np.stack(poses)) if poses else np.array([0.0, 0.0, 1.0])
         return SourceLook(content_box(other), up)
 
     def _path(self, source: str) -> Path:

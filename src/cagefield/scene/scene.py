@@ -34,7 +34,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cagefield.cameras.camera import Camera
-from cagefield.cameras.camera_paths import shared_up
 from cagefield.completion.pasting.paste_content import content_box
 from cagefield.compute.cancellation import check_cancelled
 from cagefield.edits import EditStack, LatticeError, Paste, PreparedStack
@@ -51,7 +50,7 @@ from cagefield.files.atomic import replaced_file, replaced_folder
 from cagefield.files.safe_open import real_path
 from cagefield.images.render_result import Background, RenderResult, background_rgb
 from cagefield.scene.alignment import Alignment
-from cagefield.scene.paste_sources import SceneSources
+from cagefield.scene.paste_sources import SceneSources, up_of_cameras
 from cagefield.scene.removed_elements import Removal, dump_removed, read_removed, without_removed
 from cagefield.scene.scene_files import (
     CAMERAS,
@@ -482,8 +481,7 @@ class Scene:
         """The unit direction [3] that is up: the alignment's, else the cameras'; z without either."""
         if self.alignment.up is not None:
             return self.alignment.up
-        poses = [camera.c2w for group in self.cameras.values() for camera in group]
-        return shared_up(np.stack(poses)) if poses else np.array([0.0, 0.0, 1.0])
+        return up_of_cameras(self.cameras)
 
     @cached_property
     def sources(self) -> SceneSources:
