@@ -46,6 +46,16 @@ def up_of_cameras(cameras: Mapping[str, tuple[Camera, ...]]) -> Array:
     return shared_up(np.stack(poses)) if poses else np.array([0.0, 0.0, 1.0])
 
 
+def position_beside(box: Array, up: Array, size: Array) -> Array:
+    """A point [3] at the foot of a box [2,3], beside it: with room for a box of a size [3], turned anyhow."""
+    middle, half = box.mean(axis=0), 0.5 * (box[1] - box[0])
+    aside = np.eye(3)[int(np.argmin(np.abs(up)))]
+    aside = aside - (aside @ up) * up
+    aside /= np.linalg.norm(aside)
+    reach = half @ np.abs(aside) + 0.5 * float(np.linalg.norm(size))
+    return np.asarray(middle + reach * aside - half @ np.abs(up) * up)
+
+
 class OpenedScene(Protocol):
     """Protocol of an opened source scene."""
 

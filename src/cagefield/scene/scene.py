@@ -20,7 +20,6 @@ a half of each.
 from __future__ import annotations
 
 import dataclasses
-import math
 import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -28,7 +27,7 @@ from contextlib import contextmanager
 from functools import cache, cached_property, partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -50,14 +49,20 @@ from cagefield.files.atomic import replaced_file, replaced_folder
 from cagefield.files.safe_open import real_path
 from cagefield.images.render_result import Background, RenderResult, background_rgb
 from cagefield.scene.alignment import Alignment
-from cagefield.scene.paste_sources import SceneSources, up_of_cameras
+from cagefield.scene.manifest import (
+    Manifest,
+    checked_affine,
+    checked_gains,
+    manifest_document,
+    read_manifest,
+)
+from cagefield.scene.paste_sources import SceneSources, position_beside, up_of_cameras
 from cagefield.scene.removed_elements import Removal, dump_removed, read_removed, without_removed
 from cagefield.scene.scene_files import (
     CAMERAS,
     EDITS,
     FIELD,
     FILES,
-    FORMAT,
     MANIFEST,
     ORIGINAL,
     REMOVED,
@@ -66,7 +71,6 @@ from cagefield.scene.scene_files import (
     check_part,
     read_cameras,
     read_field,
-    read_manifest,
     read_original,
     recover,
     save_original,
@@ -88,10 +92,6 @@ if TYPE_CHECKING:
 
         @property
         def gains(self) -> NDArray[np.float32] | None: ...
-
-
-MAX_CONDITION = 1e9
-"""Condition number of the linear part of `source_to_world`, from which on it counts as singular."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -134,8 +134,8 @@ class Scene:
         object.__setattr__(self, "background", background_rgb(self.background))
         if self.version != VERSION:
             raise SceneError(f"scene version is {self.version!r}; this cagefield writes version {VERSION}")
-        object.__setattr__(self, "gains", _gains(self.gains, len(cameras.get("train", ()))))
-        object.__setattr__(self, "source_to_world", _affine(self.source_to_world))
+        object.__setattr__(self, "gains", checked_gains(self.gains, len(cameras.get("train", ()))))
+        object.__setattr__(self, "source_to_world", checked_affine(self.source_to_world))
 
     @classmethod
     def trained(cls, result: Trained, dataset: Dataset) -> Scene:
@@ -295,21 +295,11 @@ class Scene:
     @contextmanager
     def draft_manifest(self, folder: Path) -> Iterator[None]:
         """The manifest is written when the context begins and takes its place in the folder when it ends."""
-        manifest: dict[str, object] = {
-            "format": FORMAT,
-            "version": self.version,
-            "background": self.background,
-        }
-        if self.gains:
-            manifest["gains"] = self.gains
-        if not self.preserve_opacity:
-            manifest["preserve_opacity"] = False
-        if not np.array_equal(self.source_to_world, np.eye(4)):
-            manifest["source_to_world"] = self.source_to_world.tolist()
-        if self.alignment:
-            manifest["alignment"] = self.alignment.to_dict()
+        manifest = Manifest(
+            self.background, self.gains, self.preserve_opacity, self.source_to_world, self.alignment
+        )
         with replaced_file(folder / MANIFEST, parents=False) as draft:
-            write_json(manifest, draft)
+            write_json(manifest_document(manifest), draft)
             yield
 
     def with_edits(self, edits: EditStack) -> Scene:
@@ -351,7 +341,7 @@ class Scene:
         up = self.up
         if at is None:
             grown = 1.0 if size is None else size / float((look.box[1] - look.box[0]).max())
-            at = _beside(content_box(self.field), up, grown * (look.box[1] - look.box[0]))
+            at = position_beside(content_box(self.field), up, grown * (look.box[1] - look.box[0]))
         found = real_path(source).stem if name is None else name
         return placed_paste(source, look.box, at, up=up, source_up=look.up, size=size, name=found)
 
@@ -400,38 +390,17 @@ class Scene:
 
     def _exact_renderer(self, camera: Camera) -> Renderer:
         """The renderer that evaluates every edit in float64, without a lattice; see `render`."""
-        from cagefield.fields.protocol import Field
-        from cagefield.rendering.reference_renderer import ReferenceRenderer
+        from cagefield.scene.exact_renderers import original_renderer, sampled_renderer
 
         if self.original is not None:
-            return self._original_renderer(self.original)
-        field = self.field
-        if isinstance(field, SplatField):
+            self.original.torch  # noqa: B018  a missing PyTorch is an error with its cure here
+            # Patches are voxels: too rough for what a continuous edit bends, and for parts with soft seams.
+            edits = [edit.replace(feather=0.0) if edit.feather else edit for edit in self.edits.resolved]
+            exact = self.patcher.prepare(edits, relight_continuous=False).without_lattices()
+            return original_renderer(self.original, exact, self.preserve_opacity)
+        if isinstance(self.field, SplatField):
             return self._exact_splats
-        near, far = _sampling_range(field, camera)
-        samples = math.ceil(2.0 * (far - near) / float(min(field.voxel_size)))
-        return ReferenceRenderer(
-            # An unbounded field is sampled beyond its bounds: without them, up to `far`.
-            cast(Field, field.__call__) if field.contracted else field,
-            self._exact_edits,
-            self.preserve_opacity,
-            samples=min(4096, max(64, samples)),
-            near=near,
-            far=far,
-        )
-
-    def _original_renderer(self, original: NerfField | ExternalField) -> Renderer:
-        original.torch  # noqa: B018  a missing PyTorch is an error with its cure here
-        # Patches are voxels: too rough for what a continuous edit bends, and for parts with soft seams.
-        edits = [edit.replace(feather=0.0) if edit.feather else edit for edit in self.edits.resolved]
-        exact = self.patcher.prepare(edits, relight_continuous=False).without_lattices()
-        if isinstance(original, ExternalField):
-            from cagefield.rendering.external.external_renderer import ExternalRenderer
-
-            return ExternalRenderer(original, exact, self.preserve_opacity)
-        from cagefield.rendering.nerf.nerf_renderer import NerfRenderer
-
-        return NerfRenderer(original, exact, self.preserve_opacity)
+        return sampled_renderer(self.field, self._exact_edits, self.preserve_opacity, camera)
 
     @cached_property
     def rendered_field(self) -> VoxelField | SplatSet:
@@ -497,57 +466,8 @@ class Scene:
         return self.prepared_edits.without_lattices()
 
 
-def _beside(box: Array, up: Array, size: Array) -> Array:
-    """A point [3] at the foot of a box [2,3], beside it: with room for a box of a size [3], turned anyhow."""
-    middle, half = box.mean(axis=0), 0.5 * (box[1] - box[0])
-    aside = np.eye(3)[int(np.argmin(np.abs(up)))]
-    aside = aside - (aside @ up) * up
-    aside /= np.linalg.norm(aside)
-    reach = half @ np.abs(aside) + 0.5 * float(np.linalg.norm(size))
-    return np.asarray(middle + reach * aside - half @ np.abs(up) * up)
-
-
 def _open_pasted(folder: Path, pasting: tuple[Path, ...]) -> Scene:
     """The scene of a folder, which is being pasted into the scenes of other ones."""
     scene = Scene.open(folder)
     scene.__dict__["_pasting"] = pasting
     return scene
-
-
-def _gains(values: Any, count: int) -> tuple[tuple[float, float, float], ...]:
-    """The gains as tuples, none or `count` of them."""
-    try:
-        gains = tuple((float(r), float(g), float(b)) for r, g, b in values)
-    except (TypeError, ValueError):
-        raise SceneError(f"gains must be a list of [r, g, b], got {values!r}") from None
-    if gains and len(gains) != count:
-        raise SceneError(f"{len(gains)} gains for {count} train cameras; give each one, or none")
-    for index, gain in enumerate(gains):
-        if not all(0.0 < channel < math.inf for channel in gain):
-            raise SceneError(f"gains[{index}] is {list(gain)}; each must be a number above 0")
-    return gains
-
-
-def _affine(values: Any) -> Array:
-    """The matrix [4,4] of an affine map that has an inverse, read-only."""
-    try:
-        matrix = np.array(values, np.float64)
-    except (TypeError, ValueError, OverflowError):
-        matrix = np.empty(0)
-    fits = matrix.shape == (4, 4) and bool(np.isfinite(matrix).all())
-    if not fits or (matrix[3] != (0, 0, 0, 1)).any() or not np.linalg.cond(matrix[:3, :3]) < MAX_CONDITION:
-        raise SceneError(
-            "source_to_world must be 4 rows of 4 finite numbers, an affine map with an inverse, got "
-            f"{values!r:.80}"
-        )
-    matrix.setflags(write=False)
-    return matrix
-
-
-def _sampling_range(voxels: VoxelField, camera: Camera) -> tuple[float, float]:
-    """Near and far distance from the camera that hold the field's box; 8 times that if unbounded."""
-    lower, upper = voxels.bounds
-    radius = 0.5 * float(((upper - lower) ** 2).sum()) ** 0.5
-    distance = float(((0.5 * (lower + upper) - camera.origin) ** 2).sum()) ** 0.5
-    reach = 8.0 if voxels.contracted else 1.0
-    return max(0.0, distance - reach * radius), distance + reach * radius

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from cagefield.cameras.camera import Camera
 from cagefield.errors import CagefieldError, SceneError
@@ -26,8 +26,6 @@ from cagefield.files.safe_open import (
     read_text,
     real_path,
 )
-from cagefield.images.render_result import background_rgb
-from cagefield.scene.alignment import Alignment
 
 FORMAT = "cagefield-scene"
 VERSION = 1
@@ -104,51 +102,6 @@ def check_part(path: Path) -> None:
         raise SceneError(f"{path} cannot be read ({error.strerror}); {cure}") from None
 
 
-class Manifest(NamedTuple):
-    """Values of a manifest; gains and source_to_world (None without) are unchecked."""
-
-    background: tuple[float, float, float] | None
-    gains: Any
-    preserve_opacity: bool
-    source_to_world: Any
-    alignment: Alignment
-
-
-def read_manifest(folder: Path) -> Manifest:
-    """The values of a scene's manifest. Raises SceneError where it is missing, damaged or newer."""
-    path = folder / MANIFEST
-    if not path.exists():
-        raise SceneError(
-            f"folder {folder} holds no {MANIFEST}: it is not a scene; give the folder of a scene"
-        )
-    check_part(path)
-    document = _read_json(path)
-    if document.get("format") != FORMAT:
-        raise SceneError(
-            f'{path}: format is {document.get("format")!r:.60}, expected "{FORMAT}"; give a scene folder'
-        )
-    version = document.get("version")
-    if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-        raise SceneError(f"{path}: version is {version!r:.40}, expected a whole number from 1 to {VERSION}")
-    if version > VERSION:
-        raise SceneError(
-            f"{path}: version is {version}, this cagefield reads up to {VERSION}; upgrade cagefield"
-        )
-    opacity = document.get("preserve_opacity", True)
-    if not isinstance(opacity, bool):
-        raise SceneError(f"{path}: preserve_opacity is {opacity!r:.40}; it must be true or false")
-    try:
-        background = background_rgb(document.get("background"))
-    except (CagefieldError, TypeError, ValueError) as error:
-        raise SceneError(f"{path}: {error!s:.200}") from None
-    try:
-        alignment = Alignment.from_value(document.get("alignment", {}))
-    except SceneError as error:
-        raise SceneError(f"{path}: {error}; correct or remove the entry in the file") from None
-    gains = document.get("gains", ())
-    return Manifest(background, gains, opacity, document.get("source_to_world"), alignment)
-
-
 def read_field(path: Path) -> VoxelField | SplatField:
     """The field in a file, of the kind that its header names.
 
@@ -181,7 +134,7 @@ def save_original(field: NerfField | ExternalField, path: Path) -> None:
 
 def read_cameras(path: Path) -> dict[str, tuple[Camera, ...]]:
     cameras: dict[str, tuple[Camera, ...]] = {}
-    for split, members in _read_json(path).items():
+    for split, members in read_json(path).items():
         if not isinstance(members, list):
             raise SceneError(f'{path}: "{split}" must be a list of cameras; write the scene again')
         read = []
@@ -198,7 +151,7 @@ def write_json(document: Mapping[str, object], path: Path) -> None:
     path.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+def read_json(path: Path) -> dict[str, Any]:
     try:
         document = json_text.loads(read_text(path))
     except (ValueError, OSError) as error:
