@@ -368,7 +368,7 @@ def needs_patch(edit: Edit, moving: bool = False, *, feathers: bool = True) -> b
 
     `feathers`: whether the field's kind has seams to feather; splats have none.
     """
-    if not isinstance(edit, Discrete) or not (edit.enabled and edit.changes_anything):
+    if not isinstance(edit, Discrete) or not (edit.enabled and edit.changes_geometry):
         return False
     seam = feathers and edit.feather > 0.0
     if not edit.uncovers:
@@ -381,7 +381,7 @@ def needs_relighting(edit: Edit) -> bool:
     return (
         isinstance(edit, Continuous)
         and edit.enabled
-        and edit.changes_anything
+        and edit.changes_geometry
         and edit.relight != "none"
         and edit.is_possible
     )

@@ -11,6 +11,7 @@ from typing import Any, TypedDict, TypeVar
 import numpy as np
 
 from cagefield.edits.edit_names import problem_of_name, problem_of_parent
+from cagefield.edits.grade import GRADE_FIELDS, NEUTRAL_GRADE, Grade
 from cagefield.edits.operation_sequence import ImpossibleOperationError, cages_along, problem_of_count
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import DEFAULT_FEATHER_VOXELS, Fill, Relight, problem_of_infill
@@ -18,7 +19,7 @@ from cagefield.edits.shells import ShellSettings
 from cagefield.edits.transformable import Transformable
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
-from cagefield.typing import Array
+from cagefield.typing import Array, Mask
 from cagefield.warps import Warp
 
 AnyEdit = TypeVar("AnyEdit", bound="AbstractEdit")
@@ -56,6 +57,7 @@ class AbstractEdit(Transformable):
     fill: Fill = "surroundings"
     relight: Relight = "occlusion"
     feather: float = DEFAULT_FEATHER_VOXELS
+    grading: Grade = NEUTRAL_GRADE
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "operations", tuple(self.operations))
@@ -67,6 +69,8 @@ class AbstractEdit(Transformable):
         if problem is not None:
             raise EditError(f"edit: {problem}")
         self._refuse(problem_of_infill(self.fill, self.relight, self.feather))
+        if not isinstance(self.grading, Grade):
+            self._refuse(f"grading must be a Grade(...), got {self.grading!r:.60}")
         self.deformed  # noqa: B018  an operation that makes an impossible cage is an error here
 
     @cached_property
@@ -129,9 +133,13 @@ class AbstractEdit(Transformable):
 
     @property
     @abstractmethod
-    def changes_anything(self) -> bool:
+    def changes_geometry(self) -> bool:
         """False where the map is the identity: the inner cage of a move, copy or continuous edit is where it
         was."""
+
+    @abstractmethod
+    def grade_weights(self, points: Array, inside: Mask) -> Array:
+        """Weights [N] in [0, 1] of the grade at canonical points [N,3]; `inside` [N] as in `Mapped`."""
 
     @property
     @abstractmethod
@@ -166,6 +174,26 @@ class AbstractEdit(Transformable):
         """Largest safe share in [0,1] of an operation on the inner cage when that is at `cage`."""
 
     # ---- shared ----
+
+    @property
+    def is_graded(self) -> bool:
+        """True where the edit changes color or opacity by its `grading`."""
+        return not self.grading.is_neutral
+
+    @property
+    def changes_anything(self) -> bool:
+        """False where the edit neither moves nor grades anything."""
+        return self.changes_geometry or self.is_graded
+
+    def grade(self: AnyEdit, **values: float) -> AnyEdit:
+        """The edit with some values of its `Grade` changed: grade(exposure=0.5, saturation=1.2).
+
+        Raises `EditError` for an unknown name, a value out of its range, and a delete.
+        """
+        unknown = next((name for name in values if name not in GRADE_FIELDS), None)
+        if unknown is not None:
+            raise self.error(f"grade has {', '.join(GRADE_FIELDS)}, not {unknown}")
+        return self.replace(grading=replace(self.grading, **values))
 
     @property
     def bounds(self) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 
 from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.edits.abstract_edit import AbstractEdit, boxes_of_cages
+from cagefield.edits.grade_falloff import GradeFalloff
 from cagefield.edits.lattice_distance import lattice_distance
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattice
@@ -21,7 +22,7 @@ from cagefield.errors import DeviceError
 from cagefield.geometry.cage import Cage
 from cagefield.geometry.control_points import ControlPoints
 from cagefield.geometry.reach_cage import ReachCage
-from cagefield.typing import Array, Float32
+from cagefield.typing import Array, Float32, Mask
 from cagefield.warps import (
     FlowShell,
     FreeFormFlow,
@@ -55,6 +56,10 @@ class ContinuousEdit(AbstractEdit):
             self._refuse(f"shell must be Flow(...) or Trilinear(), got {self.shell!r:.60}")
         self._refuse(self.shell.problem_of_inner(self.inner))
         self._refuse(problem_of_lattice(self.lattice))
+        if self.is_graded and isinstance(self.inner, ControlPoints):
+            self._refuse(
+                "control points have no inside to grade; use a box, a lattice or a mesh as inner cage"
+            )
         super().__post_init__()
         if self.outer is None or isinstance(self.outer, ReachCage):
             object.__setattr__(self, "outer", self._reach)
@@ -83,8 +88,16 @@ class ContinuousEdit(AbstractEdit):
         )
 
     @property
-    def changes_anything(self) -> bool:
+    def changes_geometry(self) -> bool:
         return self._is_moved
+
+    @cached_property
+    def grade_falloff(self) -> GradeFalloff:
+        """Weight of the grade between the canonical inner and the outer cage."""
+        return GradeFalloff.between(self.inner, self.outer)
+
+    def grade_weights(self, points: Array, inside: Mask) -> Array:
+        return self.grade_falloff.weights(points)
 
     @property
     def boxes(self) -> Array:

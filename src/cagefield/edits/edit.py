@@ -8,6 +8,7 @@ from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from typing import Any, TypeVar
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from cagefield.edits.abstract_edit import AbstractEdit, bounds_of, boxes_of_cages
@@ -28,7 +29,7 @@ from cagefield.edits.shells import (
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
 from cagefield.geometry.control_points import ControlPoints
-from cagefield.typing import Array
+from cagefield.typing import Array, Mask
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.hexahedron_map import HexahedronMap
 
@@ -62,6 +63,7 @@ class Edit(AbstractEdit, ABC):
     - relight: "occlusion" takes contact shadows along, "shadow" those of a dominant light too, where one is
       found, a `CastShadow` those of a light that is set by hand; "none" leaves all light.
     - feather: of a discrete edit of voxels, width in voxels of the blend along the faces of V.
+    - grading: change of color and opacity of what the cage contains, see `Grade`; `grade` sets its values.
 
     Every kind keeps `fill`, `relight` and `feather`, for when the kind of the edit is changed.
 
@@ -169,6 +171,9 @@ class Discrete(Edit, ABC):
     def with_shell_settings(self: AnyDiscrete, settings: ShellSettings) -> AnyDiscrete:
         return self.replace(unused_shell=settings)
 
+    def grade_weights(self, points: Array, inside: Mask) -> Array:
+        return inside.astype(np.float64)
+
     @property
     def uncovers(self) -> bool:
         """True where the content of V^c is taken away: of a move and a delete."""
@@ -212,7 +217,7 @@ class Move(Discrete):
     """Edit that shows the content of V^c in V; the rest of V^c is emptied, and filled by `fill`."""
 
     @property
-    def changes_anything(self) -> bool:
+    def changes_geometry(self) -> bool:
         return self._is_moved
 
 
@@ -221,7 +226,7 @@ class Copy(Discrete):
     """Edit that shows the content of V^c in V too; V^c stays."""
 
     @property
-    def changes_anything(self) -> bool:
+    def changes_geometry(self) -> bool:
         return self._is_moved
 
 
@@ -232,10 +237,14 @@ class Delete(Discrete):
     def __post_init__(self) -> None:
         if self.operations:
             self._refuse("a delete has no operations and keeps no source")
+        if self.is_graded:
+            self._refuse(
+                "a delete shows nothing to grade; leave grade out, or make it a move, copy or continuous"
+            )
         super().__post_init__()
 
     @property
-    def changes_anything(self) -> bool:
+    def changes_geometry(self) -> bool:
         return True
 
 
@@ -254,7 +263,7 @@ class Paste(Discrete):
         super().__post_init__()
 
     @property
-    def changes_anything(self) -> bool:
+    def changes_geometry(self) -> bool:
         return True
 
     def unread(self) -> EditError:

@@ -25,6 +25,10 @@
         fill: surroundings                    # if left out: its support goes on; or none, or a cage
                                               # to copy from: {clone: {center: [0, 2, 0], size: 0.5}}
         relight: occlusion                    # or none: contact shadows go along, if left out
+      - name: blue cup
+        inner: {center: [2, 1, 0], size: 0.5}
+        outer: {margin: 0.2}
+        grade: {exposure: 0.5, hue_deg: 120}  # or temperature, tint, saturation, opacity, see `Grade`
       - name: microphone
         source: ../microphone                 # a copy from another scene, or a file of splats: relative to
                                               # this file's folder, or absolute
@@ -76,6 +80,7 @@ from cagefield.edits.chains import problem_of_chains
 from cagefield.edits.edit import Continuous, Copy, Delete, Edit, ImpossibleEditError, Move, Paste
 from cagefield.edits.edit_names import problem_of_name, sanitize_name
 from cagefield.edits.file_nodes import Node
+from cagefield.edits.grade_nodes import dump_grade, parse_grade
 from cagefield.edits.operation_nodes import dump_operation, parse_operation
 from cagefield.edits.operation_sequence import problem_of_count
 from cagefield.edits.options import DEFAULT_FEATHER_VOXELS, CastShadow, Clone, problem_of_lattices
@@ -103,6 +108,7 @@ _OPTIONAL_KEYS = (
     "fill",
     "relight",
     "feather",
+    "grade",
     "source",
     "parent",
 )
@@ -221,6 +227,8 @@ def _edit(node: Node, check: bool, mend: bool, folder: Path | None) -> Edit:
         options["parent"] = _name(keys["parent"], mend)
     if "enabled" in keys:
         options["enabled"] = keys["enabled"].boolean()
+    if "grade" in keys and not keys["grade"].is_null:
+        options["grading"] = parse_grade(keys["grade"])
     if "feather" in keys:
         options["feather"] = keys["feather"].number()
     items = keys["operations"].items() if "operations" in keys else []
@@ -369,6 +377,8 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
         content["relight"] = edit.relight
     if edit.feather != DEFAULT_FEATHER_VOXELS:
         content["feather"] = edit.feather
+    if edit.is_graded:
+        content["grade"] = dump_grade(edit.grading)
     if settings.lattice is not None:
         content["lattice"] = settings.lattice
     if not edit.enabled:

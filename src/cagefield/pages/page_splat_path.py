@@ -6,7 +6,7 @@
     sources.k    [M] int32, rising: the splats whose colours the state's splats have
     rotations.k, scales.k   as in `page_splats`: canonical shapes, before the edits
     opacities.k  [2, M] uint8, as there
-    gains.k      [M] int32, as in `page_splat_edits`
+    gains.k      [M] int32, or [4, M], as in `page_splat_edits`
     moves.n      [2, 12, M] uint8, high bytes first: of state n, three rows of means, three of turns, six of
                  stretches
 
@@ -74,7 +74,7 @@ class SplatPathState:
 
     Of each splat: means [M,3], less the field's centre; turns [M,4] (w, x, y, z) and stretches [M,3,3], R and
     S of the map's Jacobian R S; its own shape, quaternions [M,4] and log_scales [M,3]; opacities [M]; encoded
-    gains [M].
+    gains [M] or [4,M].
     """
 
     hidden: NDArray[np.uint8]
@@ -110,7 +110,7 @@ class SplatPathState:
             np.concatenate([each.quaternions for each in fields])[made_of],
             np.concatenate([each.log_scales for each in fields])[made_of],
             splats.opacities[rows],
-            gains_of(changed)[rows],
+            gains_of(changed)[..., rows],
         )
 
 

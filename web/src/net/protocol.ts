@@ -221,6 +221,18 @@ export interface Change {
    * the edit that carries this one; 0: none
    */
   parent?: number | null;
+  grade?: GradeValues | null;
+}
+/**
+ * All values of an edit's `Grade`.
+ */
+export interface GradeValues {
+  exposure: number;
+  temperature: number;
+  tint: number;
+  saturation: number;
+  hue_deg: number;
+  opacity: number;
 }
 /**
  * Selects all or none, inverts the selection, or grows or shrinks it by a cell.
@@ -653,6 +665,7 @@ export interface EditState {
   inner_pivot: Vec3;
   outer_pivot: Vec3 | null;
   operations: string[];
+  grade: GradeValues;
   parent: number | null;
   carrier: number[] | null;
   problem: string | null;

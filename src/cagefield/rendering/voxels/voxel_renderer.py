@@ -182,6 +182,7 @@ class VoxelRenderer:
                 field.contracted,
                 edited,
                 normals,
+                self._stack.is_graded,
             )
         if isinstance(out, np.ndarray):
             return _frame(out.reshape(height, width, 8), background, normals)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -168,6 +169,7 @@ def edit_state(
         inner_pivot=vec3(cage_in_scene(edit).pivot),
         outer_pivot=None if settings.outer is None else vec3(settings.outer.pivot),
         operations=[f"{operation.noun} {operation}" for operation in edit.operations],
+        grade=common.GradeValues(**asdict(edit.grading)),
         parent=parent,
         carrier=None if carrier is None else cast(Any, tuple(carrier.reshape(-1).tolist())),
         problem=problem,

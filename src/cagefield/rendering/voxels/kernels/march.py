@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from cagefield.compute.block_cyclic import Schedule, scheduled_item, turn_count
 from cagefield.compute.quadrants import qd
 from cagefield.edits.device.kernels.edit_maps import EditArgs, map_sample
+from cagefield.edits.device.kernels.grade import grade_sample
 from cagefield.rendering.voxels.kernels.edited_ray import (
     BENT,
     STAYED,
@@ -112,11 +113,13 @@ def march_tiles(
     contracted: qd.template(),
     edited: qd.template(),
     with_normals: qd.template(),
+    graded: qd.template(),
 ):
     """Marches rows of tiles of a rectangle of a camera's picture.
 
     out: [size.y * size.x, 8]: premultiplied rgb, opacity, sum of w t, and the premultiplied normal, 0 without
     `with_normals`. `edited`: UNEDITED, EDITED, or EDITED_BY_FLOWS where a flow is evaluated exactly.
+    `graded`: whether edits grade colors.
 
     The part of a ray that may lie in the edits' boxes is found first; only its samples in occupied blocks
     evaluate the edits' maps.
@@ -210,6 +213,13 @@ def march_tiles(
                             if qd.static(edited != UNEDITED):
                                 if march.preserve_opacity == 1 and moved != STAYED:
                                     raw *= view.norm()
+                            colors = mat3(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+                            if qd.static(graded):
+                                if t >= edit_in and t <= edit_out:
+                                    colors, thickness = grade_sample(
+                                        camera.origin + t * d, edits, edited == EDITED_BY_FLOWS
+                                    )
+                                    raw *= thickness
                             keep = qd.exp(-raw * h)
                             w = T * (1.0 - keep)
                             T *= keep
@@ -221,7 +231,10 @@ def march_tiles(
                                     elif moved == BENT:
                                         seen = sh_basis(view / qd.max(view.norm(), 1e-20), K)
                                 c = gather_rgb(grid.sh, slots, b, seen, K)
-                                rgb += w * qd.max(qd.min(c, 1.0), 0.0)
+                                c = qd.max(qd.min(c, 1.0), 0.0)
+                                if qd.static(graded):
+                                    c = qd.max(qd.min(colors @ c, 1.0), 0.0)
+                                rgb += w * c
                                 depth += w * t
                                 if qd.static(with_normals):
                                     slope = density_slope(grid.density, slots, f)
