@@ -17,6 +17,7 @@ from .grade import Grade as Grade
 from .kernel_map import KernelMap as KernelMap
 from .mapped_samples import CanonicalSamples as CanonicalSamples
 from .mapped_samples import DeformedPoints as DeformedPoints
+from .mirror import Mirror as Mirror
 from .operations import Bend as Bend
 from .operations import MoveCorner as MoveCorner
 from .operations import MoveCorners as MoveCorners

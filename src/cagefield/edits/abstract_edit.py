@@ -221,7 +221,7 @@ class AbstractEdit(Transformable):
         if problem is not None:
             raise self.error(problem)
 
-    @cached_property
+    @property
     def _is_moved(self) -> bool:
         return not self.inner.has_shape_of(self.deformed)
 

@@ -14,6 +14,7 @@ from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.edits.abstract_edit import AbstractEdit, boxes_of_cages
 from cagefield.edits.grade_falloff import GradeFalloff
 from cagefield.edits.lattice_distance import lattice_distance
+from cagefield.edits.mirror import Mirror
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattice
 from cagefield.edits.shell_safety import ShellSafety
@@ -60,6 +61,8 @@ class ContinuousEdit(AbstractEdit):
             self._refuse(
                 "control points have no inside to grade; use a box, a lattice or a mesh as inner cage"
             )
+        if any(isinstance(operation, Mirror) for operation in self.operations):
+            self._refuse("a mirrored part is cut out of its surroundings; make the edit a move or a copy")
         super().__post_init__()
         if self.outer is None or isinstance(self.outer, ReachCage):
             object.__setattr__(self, "outer", self._reach)

@@ -15,6 +15,7 @@ from cagefield.edits.abstract_edit import AbstractEdit, bounds_of, boxes_of_cage
 from cagefield.edits.abstract_edit import ImpossibleEditError as ImpossibleEditError
 from cagefield.edits.continuous_edit import ContinuousEdit
 from cagefield.edits.edit_names import problem_of_source
+from cagefield.edits.mirror import mirrored_axes
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattice
 from cagefield.edits.safe_fraction import is_valid, largest_safe
@@ -171,6 +172,19 @@ class Discrete(Edit, ABC):
     def with_shell_settings(self: AnyDiscrete, settings: ShellSettings) -> AnyDiscrete:
         return self.replace(unused_shell=settings)
 
+    @cached_property
+    def mirrored(self) -> tuple[int, ...]:
+        """Axes 0 to 2 of the cage along which its content is reflected."""
+        return mirrored_axes(self.operations)
+
+    def map_between(self, canonical: Cage, deformed: Cage) -> HexahedronMap:
+        """Map of the second cage onto the first one, mirrored as the operations say."""
+        return HexahedronMap(canonical, deformed, self.mirrored)
+
+    @property
+    def _is_moved(self) -> bool:
+        return bool(self.mirrored) or super()._is_moved
+
     def grade_weights(self, points: Array, inside: Mask) -> Array:
         return inside.astype(np.float64)
 
@@ -188,7 +202,7 @@ class Discrete(Edit, ABC):
 
     @cached_property
     def exact_warp(self) -> DiscreteWarp:
-        inner = None if isinstance(self, Delete) else HexahedronMap(self.inner, self.deformed)
+        inner = None if isinstance(self, Delete) else self.map_between(self.inner, self.deformed)
         return DiscreteWarp(self.inner, inner, not self.uncovers, pasted=isinstance(self, Paste))
 
     @property

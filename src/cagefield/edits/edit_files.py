@@ -14,6 +14,7 @@
           - move_edge: {edge: [0, 1], by: [0, 0, 0.1]}
           - move_face: {face: +x, by: [0.2, 0, 0]}
           - move_corners: {corners: [0, 3, 5], by: [0.1, 0, 0]}
+          - mirror: x                         # of a move, copy or paste: along the cage's own axis
         adjustment: continuous                # or discrete
         shell: flow                           # or trilinear; flow if left out
         falloff: smooth                       # of the flow shell: smooth (if left out) or linear

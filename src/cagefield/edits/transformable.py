@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from cagefield.edits import operations as ops
+from cagefield.edits.mirror import Mirror
 from cagefield.edits.operations import Operation
 from cagefield.geometry.cage import Axes
 
@@ -74,6 +75,13 @@ class Transformable(ABC):
     def twist(self: AnyEdit, axis: str, angle: float, *, fixed: str = "start") -> AnyEdit:
         """The edit with its lattice twisted about an axis by an angle in radians; see `operations.Twist`."""
         return self.then(ops.Twist(axis, ops.degrees(angle), fixed))
+
+    def mirror(self: AnyEdit, axis: str) -> AnyEdit:
+        """The edit with the content of its cage reflected along the cage's own axis "x", "y" or "z".
+
+        Raises `EditError` for a continuous edit, whose content is connected to its surroundings.
+        """
+        return self.then(Mirror(axis))
 
     def taper(self: AnyEdit, axis: str, factor: float, *, fixed: str = "start") -> AnyEdit:
         """The edit with its lattice scaled across an axis to a factor at its end; see `operations.Taper`."""

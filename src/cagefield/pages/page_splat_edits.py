@@ -10,8 +10,8 @@ field, in the page's order, and M that come (moved ones, copies, the children of
     opacities    [2, M] uint8, high bytes first, of 65535 o
     gains        [M] int32: factors of the red, green and blue of a source's color, see
                  `encode_gains`; or, where an edit grades colors, [4, M], matrices: see `encode_colors`
-    turns        [2, 3, M] uint8, see `page_splats.encode_rotations`: R; colours are those of the source seen
-                 along R^T d
+    turns        [2, 3, M] uint8, see `page_splats.encode_orthogonals`: R; colours are those of the source
+                 seen along R^T d
 
 Where the header says `packed`, sources rise, and in the place of means and covariances there are `chunks`,
 `means`, `rotations` and `scales` as in `page_splats`, of the splats' axes in deformed space: half the bytes,
@@ -42,7 +42,7 @@ from cagefield.pages.page_splats import (
     decode_rotations,
     decode_shapes,
     encode_means,
-    encode_rotations,
+    encode_orthogonals,
     encode_shapes,
     from_byte_pairs,
     page_order,
@@ -56,7 +56,8 @@ MAGIC, VERSION = b"cagesped", 2
 @dataclass(frozen=True)
 class PageSplatEdits:
     """Decoded file: hidden [N], sources [M], means [M,3] less the centre, covariances [M,6], opacities
-    [M], turns [M,4] (w, x, y, z), gains [M,3]; colors [M,3,3] in place of gains where an edit grades them."""
+    [M], turns [M,4] (w, x, y, z), gains [M,3]; colors [M,3,3] in place of gains where an edit grades them;
+    mirrored [M], True where the orthogonal matrix is minus that of the turn."""
 
     hidden: NDArray[np.bool_]
     sources: NDArray[np.int32]
@@ -66,6 +67,7 @@ class PageSplatEdits:
     turns: Float32
     gains: Float32
     colors: Float32 | None = None
+    mirrored: NDArray[np.bool_] | None = None
 
 
 def encode_page_splat_edits(field: SplatField, changed: ChangedSplats, *, packed: bool = False) -> bytes:
@@ -90,8 +92,8 @@ def encode_page_splat_edits(field: SplatField, changed: ChangedSplats, *, packed
         arrays["means"] = (splats.means.astype(np.float64) - field.center).astype(np.float32)
         arrays["covariances"] = splats.covariances
         arrays["opacities"] = byte_pairs(np.round(65535.0 * splats.opacities.astype(np.float64)))
-    quaternions = np.broadcast_to(quaternions_from_matrices(turns), (len(splats), 4))[rows]
-    arrays["turns"] = encode_rotations(quaternions, bits=ROTATION_BITS if packed else 15)
+    turns = np.broadcast_to(turns, (len(splats), 3, 3))[rows]
+    arrays["turns"] = encode_orthogonals(turns, bits=ROTATION_BITS if packed else 15)
     arrays["gains"] = gains_of(changed)[..., rows]
     return pack(MAGIC, VERSION, header, arrays, level=LEVEL if packed else QUICK_LEVEL)
 
@@ -204,4 +206,5 @@ def decode_page_splat_edits(data: bytes) -> PageSplatEdits:
         decode_rotations(parts["turns"]),
         decode_gains(parts["gains"]) if parts["gains"].ndim == 1 else np.ones((changed, 3), np.float32),
         decode_colors(parts["gains"]) if parts["gains"].ndim == 2 else None,
+        parts["turns"][0, 2] >= 128,
     )

@@ -72,7 +72,8 @@ export interface Apply {
     | MovePointsBy
     | BendBy
     | TwistBy
-    | TaperBy;
+    | TaperBy
+    | MirrorBy;
 }
 /**
  * Move the cage.
@@ -163,6 +164,13 @@ export interface TaperBy {
   axis: "x" | "y" | "z";
   factor: number;
   fixed?: "start" | "middle" | "end";
+}
+/**
+ * Reflect the content of a move, a copy or a paste along an axis of its cage.
+ */
+export interface MirrorBy {
+  kind: "mirror";
+  axis: "x" | "y" | "z";
 }
 /**
  * A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying), its "grid"; "path".
@@ -299,7 +307,8 @@ export interface DragEnd {
     | MovePointsBy
     | BendBy
     | TwistBy
-    | TaperBy;
+    | TaperBy
+    | MirrorBy;
 }
 /**
  * Where the drag is: the whole operation since its beginning.
@@ -318,7 +327,8 @@ export interface DragMove {
     | MovePointsBy
     | BendBy
     | TwistBy
-    | TaperBy;
+    | TaperBy
+    | MirrorBy;
 }
 /**
  * Images that the page draws itself: none, those during motion, or all. It receives the edits instead.

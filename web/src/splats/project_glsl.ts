@@ -99,6 +99,7 @@ void main() {
   mat3 F;
   float o;
   vec4 turn = vec4(0.0, 0.0, 0.0, 1.0);
+  float side = 1.0;             // -1 where the turn is that of a reflection, turned over
   mat3 grade = mat3(1.0);
   if (splat < own) {
     uvec4 first = texel(records, 2u * splat), second = texel(records, 2u * splat + 1u);
@@ -115,6 +116,7 @@ void main() {
     vec4 C = uintBitsToFloat(second);
     F = cholesky(C.x, C.y, C.z, C.w, uintBitsToFloat(third.x), uintBitsToFloat(third.y));
     turn = rotation(third.zw);
+    side = (third.w & 32768u) == 0u ? 1.0 : -1.0;
     o = float(third.w >> 16) / 65535.0;
     grade = colorMatrix(texel(changed, n + 3u));
   }
@@ -149,7 +151,7 @@ void main() {
   vec3 axis = flattest(F);
   normal = floatBitsToUint(vec4(dot(axis, d) > 0.0 ? -axis : axis, 0.0));
 #endif
-  d = rotated(vec4(-turn.xyz, turn.w), d);
+  d = side * rotated(vec4(-turn.xyz, turn.w), d);
   tint = floatBitsToUint(vec4(max(grade * colorOf(source, d), 0.0), slope.y));
 }
 `;

@@ -10,6 +10,7 @@ import type { Change, EditState, Vec3 } from "../net/protocol";
 import { canFill, canRelight, selectedEdit, dragTarget } from "../app/store";
 import { h, section } from "./dom";
 import { gradeOptions } from "./grade_options";
+import { mirrorOptions } from "./mirror_options";
 import { parentRow } from "./parent_row";
 import { pointOptions } from "./point_options";
 
@@ -126,6 +127,7 @@ export function options(app: App, actions: Actions): HTMLElement {
     if (!filling) app.send({ type: "scene_change", preserve_opacity: value });
   });
 
+  const mirror = mirrorOptions(pane, applyNow);
   const grade = gradeOptions(pane, (values) => change({ grade: values }));
 
   const cages = pane.addFolder({ title: "Cages" });
@@ -199,6 +201,7 @@ export function options(app: App, actions: Actions): HTMLElement {
     points.show(edit);
     parents.show(edit, now.state?.edits ?? []);
     grade.show(edit);
+    mirror.show(edit);
     pane.refresh();
     filling = false;
     operations.replaceChildren(...edit.operations.map((text) => h("li", {}, text)));

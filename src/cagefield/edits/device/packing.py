@@ -81,7 +81,7 @@ def _pack_discrete(row: NDArray[np.float32], warp: DiscreteWarp) -> None:
     row[FIRST], row[LAST] = int(warp.inner is None), 1 if warp.region is None else 2
     row[UNDER_PLACE] = EMPTY_PLACE
     if warp.inner is not None:
-        _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
+        _record(row, 0, warp.inner.deformed.corners, warp.inner.onto)
     _record(row, 1, (warp.region or warp.source).corners)
 
 

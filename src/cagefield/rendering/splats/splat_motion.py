@@ -32,7 +32,6 @@ from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.typing import Array, Mask
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.forward import to_deformed
-from cagefield.warps.hexahedron_map import HexahedronMap
 
 MIN_LOG_GAIN = 0.01
 """The log of a change of light that is left out."""
@@ -120,7 +119,8 @@ class MovedSplats:
         """(these and the pasted splats of an edit, source positions [C,3] of those last rows)."""
         rows = splats.pasted_rows(step)
         positions = splats.field.means[rows].astype(np.float64)
-        inside, points, jacobian = HexahedronMap(step.edit.deformed, step.edit.inner)(positions)
+        onto = step.edit.map_between(step.edit.inner, step.edit.deformed).inverse
+        inside, points, jacobian = onto(positions)
         gains = None
         if self.gains is not None:
             gains = np.concatenate([self.gains, np.ones((len(points), 3))])

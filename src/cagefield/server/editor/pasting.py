@@ -10,7 +10,6 @@ from cagefield.edits.paste_placement import placed_paste
 from cagefield.errors import CageError, EditError
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
-from cagefield.warps.hexahedron_map import HexahedronMap
 
 PASTE_VIEW_SHARE = 0.5
 """Longest edge of pasted content, as a share of the view's height at the surface below it."""
@@ -37,7 +36,7 @@ def crop_paste(edit: Paste, cage: Cage) -> Paste:
 
     Raises EditError where its operations do not allow that.
     """
-    phi = HexahedronMap(edit.inner, edit.deformed).affine
+    phi = edit.map_between(edit.inner, edit.deformed).affine
     if phi is None:
         raise EditError(BENT)
     A, b = phi

@@ -55,6 +55,8 @@ def operation_of(message: operation_messages.OperationMessage) -> Operation:
         return ops.Bend(message.axis, message.degrees, message.towards, message.fixed)
     if isinstance(message, operation_messages.TwistBy):
         return ops.Twist(message.axis, message.degrees, message.fixed)
+    if isinstance(message, operation_messages.MirrorBy):
+        return ops.Mirror(message.axis)
     return ops.Taper(message.axis, message.factor, message.fixed)
 
 
