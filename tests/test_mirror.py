@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ from test_grade import fog
 CAGE = Cage.box((0.1, -0.1, 0.0), (0.8, 0.7, 0.6), rotation=(0.2, 0.1, 0.4))
 EVERYTHING = Cage.box((0, 0, 0), 20.0)
 CAMERA = Camera.look_at((2.2, -1.6, 1.1), (0, 0, 0), width=20, height=18, fov_x=0.75)
-BARE = {"fill": "none", "relight": "none", "feather": 0.0}
+BARE: dict[str, Any] = {"fill": "none", "relight": "none", "feather": 0.0}
 
 EDITS = {
     "in place": Edit.move(CAGE, **BARE).mirror("x"),
@@ -111,12 +111,12 @@ def test_the_kernels_map_is_the_references(name: str) -> None:
 def test_voxels_match_the_plain_renderer(name: str) -> None:
     field, stack = fog(), EditStack([EDITS[name]])
     plain = render_sampled(field, CAMERA, edits=stack, samples=200)
-    assert psnr(VoxelRenderer(field, stack, step=0.25).render(CAMERA).rgb, plain.rgb) > 45.0
+    assert psnr(VoxelRenderer(field, stack, step=0.25).render(CAMERA).rgb, plain.rgb) > 50.0
     unmirrored = EDITS[name].replace(
         operations=[each for each in EDITS[name].operations if not isinstance(each, Mirror)]
     )
     assert (
-        psnr(render_sampled(field, CAMERA, edits=EditStack([unmirrored]), samples=200).rgb, plain.rgb) < 40.0
+        psnr(render_sampled(field, CAMERA, edits=EditStack([unmirrored]), samples=200).rgb, plain.rgb) < 48.0
     )
 
 
@@ -136,8 +136,8 @@ def test_the_picture_of_a_mirrored_scene_is_the_mirrored_picture() -> None:
     stack = EditStack([Edit.move(EVERYTHING, **BARE).mirror("x")])
     ahead = Camera.look_at((0.0, -4.0, 0.0), (0, 0, 0), width=48, height=40, fov_x=0.6)
     plain = SplatRenderer(field).render(ahead)
-    for shown in (SplatRenderer(field, stack), SplatRenderer(baked_splats(field, stack, split=False))):
-        assert psnr(shown.render(ahead).rgb, plain.rgb[:, ::-1]) > 50.0
+    for renderer in (SplatRenderer(field, stack), SplatRenderer(baked_splats(field, stack, split=False))):
+        assert psnr(renderer.render(ahead).rgb, plain.rgb[:, ::-1]) > 50.0
     voxels = fog()
     plain = VoxelRenderer(voxels, step=0.25).render(ahead)
     shown = VoxelRenderer(voxels, stack, step=0.25).render(ahead)
@@ -163,7 +163,7 @@ def test_files_and_errors() -> None:
       operations: [{mirror: x}]
     """
     assert parse_edits(text)[0].operations == (Mirror("x"),)
-    with pytest.raises(EditFileError, match="one of x, y, z"):
+    with pytest.raises(EditFileError, match="must be x or y or z"):
         parse_edits(text.replace("mirror: x", "mirror: w"))
     with pytest.raises(EditFileError, match="make the edit a move or a copy"):
         parse_edits(text.replace("adjustment: discrete", "outer: {margin: 0.5}"))
@@ -175,4 +175,4 @@ def test_a_mirrored_part_keeps_its_opacity_and_color() -> None:
     field = random_splats(50, seed=8, degree=0)
     baked = baked_splats(field, EditStack([Edit.move(EVERYTHING, **BARE).mirror("z")]), split=False)
     np.testing.assert_allclose(np.sort(baked.opacities), np.sort(field.opacities), atol=1e-6)
-    assert dataclasses.replace(field, means=baked.means, log_scales=baked.log_scales).sh is not None
+    assert sorted(baked.sh[:, 0, 0].tolist()) == sorted(field.sh[:, 0, 0].tolist())

@@ -189,7 +189,7 @@ class Patcher:
     ) -> Pasted:
         """Content of a paste, composited with the field beneath; below stage LIT only if cached."""
         assert isinstance(self._field, VoxelField)  # splats need no compositing
-        key: Key = (*below.steps, pasted, edit.deformed, preserve_opacity)
+        key: Key = (*below.steps, pasted, edit.deformed, edit.mirrored, preserve_opacity)
         if key not in self._composites:
             if stage < PatchStage.LIT:
                 return pasted
@@ -272,7 +272,8 @@ class Patcher:
         feather = edit.feather if is_voxels else 0.0
         kind = type(edit), edit.fill, feather, pasted, preserve_opacity
         base_key: Key = (*below.steps, edit.inner, *kind, has_light and edit.relight)
-        final_key: Key = (*base_key, edit.deformed if has_light or feather > 0.0 else None)
+        shown = (edit.deformed, edit.mirrored) if has_light or feather > 0.0 else None
+        final_key: Key = (*base_key, shown)
         moving_key: Key = (*base_key, "moving")
         unlit_key: Key = (*below.steps, edit.inner, *kind, False, "moving")
         for key in (final_key,) if is_lit else (final_key, moving_key):
@@ -311,7 +312,7 @@ class Patcher:
                 pasted=pasted,
             )
 
-        inputs = ("patch", model, *below.steps, edit, preserve_opacity)
+        inputs = ("patch", model, *below.steps, edit.ungraded, preserve_opacity)
         patch = self._disk_cache.get_or_make(inputs, make) if is_lit else make()
         self._store(final_key if is_lit else moving_key, patch)
         return patch
@@ -346,7 +347,7 @@ class Patcher:
                 self._light_block = block_key, around
             return None if light is None else light.patch
 
-        patch = self._disk_cache.get_or_make(("light", model, *below.steps, edit), make)
+        patch = self._disk_cache.get_or_make(("light", model, *below.steps, edit.ungraded), make)
         relighting = None if patch is None else light_edit(edit, patch)
         self._store(key, relighting)
         return relighting

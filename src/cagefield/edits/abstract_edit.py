@@ -180,6 +180,11 @@ class AbstractEdit(Transformable):
         """True where the edit changes color or opacity by its `grading`."""
         return not self.grading.is_neutral
 
+    @cached_property
+    def ungraded(self: AnyEdit) -> AnyEdit:
+        """The edit with a neutral grade; itself where it has one."""
+        return self.replace(grading=NEUTRAL_GRADE) if self.is_graded else self
+
     @property
     def changes_anything(self) -> bool:
         """False where the edit neither moves nor grades anything."""

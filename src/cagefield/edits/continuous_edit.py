@@ -151,7 +151,7 @@ class ContinuousEdit(AbstractEdit):
         Kept while this edit, or an equal one, lives. Raises `DeviceError` where no device starts, `EditError`
         without a lattice, without enough free memory, and as `check` does.
         """
-        return _lattice_nodes(self)
+        return _lattice_nodes(self.ungraded)
 
     @property
     def _kernel_lattice(self) -> Lattice:

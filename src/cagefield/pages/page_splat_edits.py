@@ -92,8 +92,8 @@ def encode_page_splat_edits(field: SplatField, changed: ChangedSplats, *, packed
         arrays["means"] = (splats.means.astype(np.float64) - field.center).astype(np.float32)
         arrays["covariances"] = splats.covariances
         arrays["opacities"] = byte_pairs(np.round(65535.0 * splats.opacities.astype(np.float64)))
-    turns = np.broadcast_to(turns, (len(splats), 3, 3))[rows]
-    arrays["turns"] = encode_orthogonals(turns, bits=ROTATION_BITS if packed else 15)
+    orthogonals = np.broadcast_to(turns, (len(splats), 3, 3))[rows]
+    arrays["turns"] = encode_orthogonals(orthogonals, bits=ROTATION_BITS if packed else 15)
     arrays["gains"] = gains_of(changed)[..., rows]
     return pack(MAGIC, VERSION, header, arrays, level=LEVEL if packed else QUICK_LEVEL)
 

@@ -35,7 +35,8 @@ interface State {
   layers: PlacedLayer[];
 }
 
-const { BOX_ROWS, BOX_VECTOR, EDIT_ROWS, GRADE_SCALARS, HEXAHEDRON, HEXAHEDRON_ROWS, Y_BOX_VECTOR } = EDIT_LAYOUT;
+const { BOX_ROWS, BOX_VECTOR, EDIT_ROWS, GRADE_SCALARS, HEXAHEDRON, HEXAHEDRON_ROWS, Y_BOX_VECTOR } =
+  EDIT_LAYOUT;
 
 /**
  * First rows of the boxes of an edit, whose union is taken between two states: its own, and those of its

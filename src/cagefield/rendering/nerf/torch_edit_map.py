@@ -88,7 +88,7 @@ class TensorMap:
         if self.is_reference:
             grade = self._stack.to_canonical(points.detach().cpu().numpy().astype(np.float64)).grade
             assert grade is not None
-            return tuple(  # type: ignore[return-value]
+            return tuple(
                 torch.from_numpy(values.astype(np.float32)).to(self.device)
                 for values in (grade.colors, grade.density)
             )

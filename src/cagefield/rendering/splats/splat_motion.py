@@ -117,6 +117,7 @@ class MovedSplats:
 
     def _with(self, step: PreparedEdit, splats: SplatSet) -> tuple[MovedSplats, Array]:
         """(these and the pasted splats of an edit, source positions [C,3] of those last rows)."""
+        assert isinstance(step.edit, Paste)
         rows = splats.pasted_rows(step)
         positions = splats.field.means[rows].astype(np.float64)
         onto = step.edit.map_between(step.edit.inner, step.edit.deformed).inverse
