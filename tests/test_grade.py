@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from cagefield.fields.sh import sh_basis
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.images.metrics import psnr
+from cagefield.rendering.edited_field import EditedField
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.splats.bake_splats import baked_splats
 from cagefield.rendering.splats.raster_splats import deformed_splats
@@ -157,6 +160,28 @@ def test_baked_splats_look_as_the_graded_ones(name: str) -> None:
     baked = SplatRenderer(baked_splats(field, stack)).render(CAMERA)
     assert psnr(shown.rgb, baked.rgb) > 80.0
     assert psnr(shown.rgb, SplatRenderer(field).render(CAMERA).rgb) < 60.0
+
+
+@pytest.mark.parametrize("name", ["turned, lattice", "move", "two"])
+def test_networks_are_graded_as_the_reference(name: str) -> None:
+    torch = pytest.importorskip("torch")
+    from cagefield.rendering.nerf.torch_edit_map import TensorMap
+
+    field, stack = fog(), EditStack(STACKS[name])
+    rng = np.random.default_rng(8)
+    p, d = (rng.uniform(-0.9, 0.9, (2000, 3)).astype(np.float32) for _ in range(2))
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+
+    def network(points: Any, viewdirs: Any) -> tuple[Any, Any]:
+        return tuple(torch.from_numpy(values) for values in field(points.numpy(), viewdirs.numpy()))  # type: ignore[return-value]
+
+    mapped = TensorMap(stack, torch.device("cpu"))
+    found = mapped.evaluated(torch.from_numpy(p), torch.from_numpy(d), network)
+    expected = EditedField(field, stack, field.bounds)(p, d)
+    for ours, theirs in zip(found, expected, strict=True):
+        assert np.quantile(np.abs(ours.numpy() - theirs), 0.995) < 5e-3
+    ungraded = EditedField(field, EditStack(edit.ungraded for edit in stack), field.bounds)(p, d)
+    assert np.abs(ungraded[1] - expected[1]).max() > 0.1
 
 
 def test_the_optical_depth_of_a_splat_is_multiplied() -> None:

@@ -14,7 +14,6 @@
           - move_edge: {edge: [0, 1], by: [0, 0, 0.1]}
           - move_face: {face: +x, by: [0.2, 0, 0]}
           - move_corners: {corners: [0, 3, 5], by: [0.1, 0, 0]}
-          - mirror: x                         # of a move, copy or paste: along the cage's own axis
         adjustment: continuous                # or discrete
         shell: flow                           # or trilinear; flow if left out
         falloff: smooth                       # of the flow shell: smooth (if left out) or linear
@@ -26,10 +25,6 @@
         fill: surroundings                    # if left out: its support goes on; or none, or a cage
                                               # to copy from: {clone: {center: [0, 2, 0], size: 0.5}}
         relight: occlusion                    # or none: contact shadows go along, if left out
-      - name: blue cup
-        inner: {center: [2, 1, 0], size: 0.5}
-        outer: {margin: 0.2}
-        grade: {exposure: 0.5, hue_deg: 120}  # or temperature, tint, saturation, opacity, see `Grade`
       - name: microphone
         source: ../microphone                 # a copy from another scene, or a file of splats: relative to
                                               # this file's folder, or absolute
@@ -54,8 +49,10 @@
           - move_point: {point: 12, by: [0, 0, 0.2]}    # a vertex
 
 Further keys of an edit: keep_source (discrete: copy instead of move), enabled, allow_folding, parent (the
-name of the edit that carries this one, see `chains`). Lengths are
-world units, angles degrees. `parse_edits(dump_edits(stack))` is the stack, bit for bit.
+name of the edit that carries this one, see `chains`), grade (not of a deletion: {exposure: 0.5, hue_deg: 30},
+or temperature, tint, saturation, opacity, see `Grade`). One more operation, of a move, copy or paste, is
+mirror: x, y or z, along the cage's own axis. Lengths are world units, angles degrees.
+`parse_edits(dump_edits(stack))` is the stack, bit for bit.
 """
 
 from __future__ import annotations

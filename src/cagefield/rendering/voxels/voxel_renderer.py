@@ -162,6 +162,8 @@ class VoxelRenderer:
         edited = march.UNEDITED if self._stack.n_edits == 0 else march.EDITED
         if self._stack.has_flows:
             edited = march.EDITED_BY_FLOWS
+        if self._stack.is_graded:
+            edited += march.GRADED - march.EDITED
         rows = down if proceed is None else BAND
         for row in range(0, down, rows):
             if proceed is not None:
@@ -182,7 +184,6 @@ class VoxelRenderer:
                 field.contracted,
                 edited,
                 normals,
-                self._stack.is_graded,
             )
         if isinstance(out, np.ndarray):
             return _frame(out.reshape(height, width, 8), background, normals)

@@ -14,6 +14,7 @@ from cagefield.typing import Array
 PASTE_VIEW_SHARE = 0.5
 """Longest edge of pasted content, as a share of the view's height at the surface below it."""
 
+MIRRORED = "the paste is mirrored about the middle of its cage; crop it first, and mirror it then"
 BENT = "what is pasted was bent; take the moves of its corners back, then set its cage"
 TURNED = "the cage of a paste shrinks, grows and moves in Set mode; turn it in Edit mode (Tab)"
 
@@ -36,6 +37,8 @@ def crop_paste(edit: Paste, cage: Cage) -> Paste:
 
     Raises EditError where its operations do not allow that.
     """
+    if edit.mirrored:
+        raise EditError(MIRRORED)
     phi = edit.map_between(edit.inner, edit.deformed).affine
     if phi is None:
         raise EditError(BENT)

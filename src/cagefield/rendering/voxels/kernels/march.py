@@ -70,8 +70,9 @@ class TileArgs:
     rows: qd.i32
 
 
-UNEDITED, EDITED, EDITED_BY_FLOWS = range(3)
-"""Maps that a march evaluates: none, those of edits from lattices or closed forms, flows too."""
+UNEDITED, EDITED, EDITED_BY_FLOWS, GRADED, GRADED_BY_FLOWS = range(5)
+"""Work of a march for edits: none, maps from lattices or closed forms, flows too (even numbers), and
+grades of colors with them (from GRADED on)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,13 +114,11 @@ def march_tiles(
     contracted: qd.template(),
     edited: qd.template(),
     with_normals: qd.template(),
-    graded: qd.template(),
 ):
     """Marches rows of tiles of a rectangle of a camera's picture.
 
     out: [size.y * size.x, 8]: premultiplied rgb, opacity, sum of w t, and the premultiplied normal, 0 without
-    `with_normals`. `edited`: UNEDITED, EDITED, or EDITED_BY_FLOWS where a flow is evaluated exactly.
-    `graded`: whether edits grade colors.
+    `with_normals`. `edited`: UNEDITED to GRADED_BY_FLOWS.
 
     The part of a ray that may lie in the edits' boxes is found first; only its samples in occupied blocks
     evaluate the edits' maps.
@@ -190,9 +189,7 @@ def march_tiles(
                     if qd.static(edited != UNEDITED):
                         if t >= edit_in and t <= edit_out:
                             p = camera.origin + t * d
-                            canonical, view, place, moved = map_along(
-                                ray, t, p, d, edits, edited == EDITED_BY_FLOWS
-                            )
+                            canonical, view, place, moved = map_along(ray, t, p, d, edits, edited % 2 == 0)
                             if moved != STAYED:
                                 g = to_grid(canonical, grid, contracted)
                     # The last bricks reach beyond the grid, and an edit may map samples there.
@@ -214,10 +211,10 @@ def march_tiles(
                                 if march.preserve_opacity == 1 and moved != STAYED:
                                     raw *= view.norm()
                             colors = mat3(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-                            if qd.static(graded):
+                            if qd.static(edited >= GRADED):
                                 if t >= edit_in and t <= edit_out:
                                     colors, thickness = grade_sample(
-                                        camera.origin + t * d, edits, edited == EDITED_BY_FLOWS
+                                        camera.origin + t * d, edits, edited % 2 == 0
                                     )
                                     raw *= thickness
                             keep = qd.exp(-raw * h)
@@ -232,7 +229,7 @@ def march_tiles(
                                         seen = sh_basis(view / qd.max(view.norm(), 1e-20), K)
                                 c = gather_rgb(grid.sh, slots, b, seen, K)
                                 c = qd.max(qd.min(c, 1.0), 0.0)
-                                if qd.static(graded):
+                                if qd.static(edited >= GRADED):
                                     c = qd.max(qd.min(colors @ c, 1.0), 0.0)
                                 rgb += w * c
                                 depth += w * t
@@ -246,7 +243,7 @@ def march_tiles(
                                     if qd.static(edited != UNEDITED):
                                         if moved != STAYED:
                                             slope = through_edits(
-                                                slope, camera.origin + t * d, edits, edited == EDITED_BY_FLOWS
+                                                slope, camera.origin + t * d, edits, edited % 2 == 0
                                             )
                                     normal -= w * slope / qd.max(slope.norm(), 1e-12)
                     t += h
