@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cagefield.cameras.camera import Camera, turntable
-from cagefield.edits import Edit, EditStack, PreparedStack, Trilinear
+from cagefield.edits import Edit, EditStack, Grade, PreparedStack, Trilinear
 from cagefield.errors import EditError
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
@@ -181,6 +181,8 @@ COPIED = (
 )
 GONE = Edit.delete(Cage.box((0.6, 0.5, 0.3), (0.9, 0.9, 1.0)))
 
+GRADE = Grade(exposure=0.6, temperature=0.8, tint=0.2, saturation=1.4, hue_deg=100.0, opacity=0.5)
+
 STACKS = {
     "affine": [TURNED],
     "bent": [BENT],
@@ -190,6 +192,15 @@ STACKS = {
     "copied": [COPIED],
     "deleted": [GONE],
     "stack": [GONE, TURNED, COPIED, MOVED],
+    "graded": [Edit.continuous(INNER, OUTER, lattice=24, grading=GRADE)],
+    "graded, turned": [TURNED.replace(grading=GRADE)],
+    "graded stack": [
+        LEANING.replace(grading=GRADE),
+        COPIED.grade(saturation=0.3, opacity=2.0),
+        MOVED.grade(hue_deg=-60.0),
+    ],
+    "mirrored": [MOVED.mirror("x").mirror("z")],
+    "mirrored, bent": [COPIED.mirror("y")],
 }
 
 

@@ -22,6 +22,7 @@ OPERATIONS: tuple[ops.Operation, ...] = (
     ops.MoveEdge((2, 6), (0.02, -0.02, 0.03)),
     ops.MoveFace("-y", (0.01, -0.04, 0.02)),
     ops.MoveCorners((1, 4, 6), (-0.02, 0.01, 0.01)),
+    ops.Mirror("y"),
 )
 
 

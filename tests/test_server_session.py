@@ -12,6 +12,8 @@ from cagefield.edits import (
     Edit,
     EditStack,
     Flow,
+    Grade,
+    Mirror,
     MoveCorner,
     Rotate,
     Scale,
@@ -432,3 +434,31 @@ def test_the_space_below_an_edit_is_that_of_the_shown_edits_before_it() -> None:
     s = session(ARM.translate((0.1, 0, 0)), CUP.replace(enabled=False), CUP)
     assert s.below(3) == (s.document.entry(1).edit,)
     assert s.below(1) == ()
+
+
+def test_a_grade_is_set_undone_and_kept_through_kinds() -> None:
+    s = session(CUP.translate((0, 0.1, 0)))
+    s.change(1, grade={"exposure": 0.5, "saturation": 1.2})
+    assert s.history.names == ("Open", "Color of cup")
+    assert s.document.entry(1).edit.grading == Grade(exposure=0.5, saturation=1.2)
+    assert edit_state(s.document.entry(1), None, None).grade.saturation == 1.2
+    for kind in ("continuous", "copy", "delete"):
+        s.change(1, kind=kind)  # type: ignore[arg-type]
+    assert not s.document.entry(1).edit.is_graded
+    s.change(1, kind="move")
+    assert s.document.entry(1).edit.grading == Grade(exposure=0.5, saturation=1.2)
+    for _ in range(5):
+        s.undo()
+    assert not s.document.entry(1).edit.is_graded
+    assert s.saved
+
+
+def test_a_mirror_is_an_operation_of_cut_out_parts() -> None:
+    s = session(CUP.translate((0, 0.1, 0)))
+    s.apply(1, "field", Mirror("x"))
+    assert s.document.entry(1).edit.operations[-1] == Mirror("x")
+    assert s.history.names[-1] == "Mirroring of cup"
+    with pytest.raises(EditError, match="make the edit a move or a copy"):
+        s.change(1, kind="continuous")
+    s.undo()
+    assert s.document.entry(1).edit.operations == (Translate((0, 0.1, 0)),)

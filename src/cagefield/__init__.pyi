@@ -8,6 +8,7 @@ from .datasets.views import Dataset as Dataset
 from .edits.edit import Edit as Edit
 from .edits.edit_files import load_edits as load_edits
 from .edits.edit_files import save_edits as save_edits
+from .edits.grade import Grade as Grade
 from .edits.stack import EditStack as EditStack
 from .errors import CagefieldError as CagefieldError
 from .fields.baking import bake as bake

@@ -17,6 +17,7 @@ export function edit(change: Partial<EditState> = {}): EditState {
     width: 1,
     lattice: 0,
     lattice_error: null,
+    grade: { exposure: 0, temperature: 0, tint: 0, saturation: 1, hue_deg: 0, opacity: 1 },
     fill: "surroundings",
     relight: "occlusion",
     inner,

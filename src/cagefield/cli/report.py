@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.edits import Continuous, Copy, Delete, Discrete, Paste
+from cagefield.edits.grade_nodes import dump_grade
 from cagefield.edits.options import Clone
 from cagefield.errors import EditError
 from cagefield.fields.contraction import uncontract
@@ -96,6 +97,9 @@ def _details(edit: Edit, content: _Content) -> Iterable[str]:
         return
     for operation in edit.operations:
         yield f"{operation.noun} {operation}"
+    if edit.is_graded:
+        values = (f"{name} {value:g}" for name, value in dump_grade(edit.grading).items())
+        yield f"grades {share:.1%} of the field's {content.noun}: {', '.join(values)}"
     if isinstance(edit, Paste):
         low, high = edit.deformed.aabb
         box = " x ".join(f"{edge:.4g}" for edge in high - low)
@@ -103,6 +107,8 @@ def _details(edit: Edit, content: _Content) -> Iterable[str]:
         return
     if not edit.changes_anything:
         yield "changes nothing: the inner cage is where it was"
+        return
+    if not edit.changes_geometry:
         return
     reach = np.linalg.norm(edit.deformed.handles - edit.inner.handles, axis=1).max()
     handles = "corners" if edit.inner.is_hexahedron else "points"

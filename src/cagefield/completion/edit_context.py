@@ -260,9 +260,14 @@ class EditContext:
         mask = on_part.mask & self.inside
         return change, LightChange(mask, on_part.log_ratio[self.inside[on_part.mask]])
 
+    @property
+    def _onto_deformed(self) -> HexahedronMap:
+        """Map of V^c onto V."""
+        return self.edit.map_between(self.edit.inner, self.edit.deformed).inverse
+
     def _move(self, surface: Surfels) -> tuple[Surfels, Surfels]:
         """(surfels inside V^c, the same surfels at the destination)."""
-        inside, points, jacobian = HexahedronMap(self.edit.deformed, self.edit.inner)(surface.points)
+        inside, points, jacobian = self._onto_deformed(surface.points)
         part = surface.take(inside)
         return part, part.transform(points, jacobian)
 
@@ -275,8 +280,7 @@ class EditContext:
         if block is self.before and feather == 0.0:
             return None
         if feather > 0.0:
-            edit = self.edit
-            block = feather_rim(block, destination, edit.inner, edit.deformed, self.inside, feather)
+            block = feather_rim(block, destination, self._onto_deformed, self.inside, feather)
         is_near = ndimage.binary_dilation(self.inside, iterations=2)
         vertices = np.argwhere(is_near)
         part = replace(block, slot=np.where(is_near, block.slot, -1))

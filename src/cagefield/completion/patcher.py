@@ -190,7 +190,7 @@ class Patcher:
     ) -> Pasted:
         """Content of a paste, composited with the field beneath; below stage LIT only if cached."""
         assert isinstance(self._field, VoxelField)  # splats need no compositing
-        key: Key = (*below.steps, pasted, edit.deformed, preserve_opacity)
+        key: Key = (*below.steps, pasted, edit.deformed, edit.mirrored, preserve_opacity)
         if key not in self._composites:
             if stage < PatchStage.LIT:
                 return pasted
@@ -278,7 +278,8 @@ class Patcher:
         feather = edit.feather if is_voxels else 0.0
         kind = type(edit), edit.fill, feather, pasted, preserve_opacity
         base_key: Key = (*below.steps, edit.inner, *kind, has_light and edit.relight)
-        final_key: Key = (*base_key, edit.deformed if has_light or feather > 0.0 else None)
+        shown = (edit.deformed, edit.mirrored) if has_light or feather > 0.0 else None
+        final_key: Key = (*base_key, shown)
         moving_key: Key = (*base_key, "moving")
         unlit_key: Key = (*below.steps, edit.inner, *kind, False, "moving")
         for key in (final_key,) if is_lit else (final_key, moving_key):
@@ -317,7 +318,7 @@ class Patcher:
                 pasted=pasted,
             )
 
-        inputs = ("patch", model, *below.steps, edit, preserve_opacity)
+        inputs = ("patch", model, *below.steps, edit.ungraded, preserve_opacity)
         patch = self._disk_cache.get_or_make(inputs, make) if is_lit else make()
         self._store(final_key if is_lit else moving_key, patch)
         return patch
@@ -352,7 +353,7 @@ class Patcher:
                 self._light_block = block_key, around
             return None if light is None else light.patch
 
-        patch = self._disk_cache.get_or_make(("light", model, *below.steps, edit), make)
+        patch = self._disk_cache.get_or_make(("light", model, *below.steps, edit.ungraded), make)
         relighting = None if patch is None else light_edit(edit, patch)
         self._store(key, relighting)
         return relighting
@@ -374,7 +375,7 @@ def needs_patch(edit: Edit, moving: bool = False, *, feathers: bool = True) -> b
 
     `feathers`: whether the field's kind has seams to feather; splats have none.
     """
-    if not isinstance(edit, Discrete) or not (edit.enabled and edit.changes_anything):
+    if not isinstance(edit, Discrete) or not (edit.enabled and edit.changes_geometry):
         return False
     seam = feathers and edit.feather > 0.0
     if not edit.uncovers:
@@ -387,7 +388,7 @@ def needs_relighting(edit: Edit) -> bool:
     return (
         isinstance(edit, Continuous)
         and edit.enabled
-        and edit.changes_anything
+        and edit.changes_geometry
         and edit.relight != "none"
         and edit.is_possible
     )

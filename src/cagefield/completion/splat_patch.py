@@ -8,7 +8,7 @@ inpainted surfaces get new splats (`completion.inpainting.splat_inpainting`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -187,9 +187,7 @@ def _crop_splats(field: SplatField, moved: MovedSplats, box: Array) -> MovedSpla
         return np.asarray(((points + radius >= box[0]) & (points - radius <= box[1])).all(axis=1))
 
     is_near = is_near_box(moved.points, moved.source)
-    gains = None if moved.gains is None else moved.gains[is_near]
-    has_left = moved.left | ~is_near_box(field.means, slice(None))
-    return MovedSplats(has_left, moved.source[is_near], moved.points[is_near], moved.jacobian[is_near], gains)
+    return replace(moved.take(is_near), left=moved.left | ~is_near_box(field.means, slice(None)))
 
 
 def _to_new_light(block: GridBlock, light: LightChange | None) -> NewLight:

@@ -13,9 +13,11 @@ from .edit_files import save_edits as save_edits
 from .edit_map import EditMap as EditMap
 from .edit_map import PreparedStack as PreparedStack
 from .edit_map import SpaceMap as SpaceMap
+from .grade import Grade as Grade
 from .kernel_map import KernelMap as KernelMap
 from .mapped_samples import CanonicalSamples as CanonicalSamples
 from .mapped_samples import DeformedPoints as DeformedPoints
+from .mirror import Mirror as Mirror
 from .operations import Bend as Bend
 from .operations import MoveCorner as MoveCorner
 from .operations import MoveCorners as MoveCorners

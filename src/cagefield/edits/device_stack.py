@@ -13,26 +13,30 @@ from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.device_buffers import rows_for_kernels, vectors_for_kernels
 from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.edits.buffer_pool import BufferPool
-from cagefield.edits.device.kernels.device_stack import map_samples
+from cagefield.edits.device.kernels.device_stack import grade_samples, map_samples
 from cagefield.edits.device.kernels.edit_maps import EditArgs
 from cagefield.edits.device.packing import (
     ALONE,
     CHANGED_BOX,
     FIRST,
     FLOW,
+    GRADED,
     IMAGE,
     OFFSET,
     PART_PLACE,
     RECORD,
     RECORDS,
     RESOLUTION,
+    STILL,
     UNDER_PLACE,
     WIDTH,
+    pack_grade,
     pack_warp,
     widened,
 )
 from cagefield.edits.edit import Continuous, Edit, Paste
 from cagefield.edits.edit_map import EditMap
+from cagefield.edits.mapped_samples import SampleGrade
 from cagefield.edits.prepared import PreparedEdit
 from cagefield.warps import flow_table
 from cagefield.warps.flow_shell import FlowShell
@@ -99,6 +103,20 @@ class DeviceStack:
         """True where a flow shell is evaluated exactly: kernels without one leave its code out."""
         return bool((self.params[:, RESOLUTION] == FLOW).any())
 
+    @cached_property
+    def is_graded(self) -> bool:
+        """True where an edit grades colors: kernels leave the code out where none does."""
+        return bool((self.params[:, GRADED] > 0.0).any())
+
+    def grade(self, points: NDArray[np.float32]) -> SampleGrade:
+        """Grade of deformed points [N,3], by `grade_sample`."""
+        devices.start()
+        out = np.empty((len(points), 10), dtype=np.float32)
+        if len(points):
+            schedule = block_cyclic_schedule(len(points))
+            grade_samples(np.ascontiguousarray(points, np.float32), schedule, out, self.args, self.has_flows)
+        return SampleGrade(out[:, :9].reshape(-1, 3, 3).astype(np.float64), out[:, 9].astype(np.float64))
+
     def to_canonical(
         self, points: NDArray[np.float32], viewdirs: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
@@ -132,7 +150,10 @@ def _packed(step: PreparedEdit) -> NDArray[np.float32]:
     if isinstance(edit, Paste) and step.part is None:
         raise edit.unread()
     lattice = edit.kernel_lattice if isinstance(edit, Continuous) else None
-    return pack_warp(step.exact_warp, step.boxes, lattice)
+    row = pack_warp(step.exact_warp, step.boxes, lattice)
+    pack_grade(row, edit.grading, edit.grade_falloff if isinstance(edit, Continuous) else None)
+    row[STILL] = isinstance(edit, Continuous) and not edit.changes_geometry
+    return row
 
 
 def _nodes_of(edit: Edit) -> NDArray[np.float32]:

@@ -49,8 +49,10 @@
           - move_point: {point: 12, by: [0, 0, 0.2]}    # a vertex
 
 Further keys of an edit: keep_source (discrete: copy instead of move), enabled, allow_folding, parent (the
-name of the edit that carries this one, see `chains`). Lengths are
-world units, angles degrees. `parse_edits(dump_edits(stack))` is the stack, bit for bit.
+name of the edit that carries this one, see `chains`), grade (not of a deletion: {exposure: 0.5, hue_deg: 30},
+or temperature, tint, saturation, opacity, see `Grade`). One more operation, of a move, copy or paste, is
+mirror: x, y or z, along the cage's own axis. Lengths are world units, angles degrees.
+`parse_edits(dump_edits(stack))` is the stack, bit for bit.
 """
 
 from __future__ import annotations
@@ -76,6 +78,7 @@ from cagefield.edits.chains import problem_of_chains
 from cagefield.edits.edit import Continuous, Copy, Delete, Edit, ImpossibleEditError, Move, Paste
 from cagefield.edits.edit_names import problem_of_name, sanitize_name
 from cagefield.edits.file_nodes import Node
+from cagefield.edits.grade_nodes import dump_grade, parse_grade
 from cagefield.edits.operation_nodes import dump_operation, parse_operation
 from cagefield.edits.operation_sequence import problem_of_count
 from cagefield.edits.options import DEFAULT_FEATHER_VOXELS, CastShadow, Clone, problem_of_lattices
@@ -103,6 +106,7 @@ _OPTIONAL_KEYS = (
     "fill",
     "relight",
     "feather",
+    "grade",
     "source",
     "parent",
 )
@@ -221,6 +225,8 @@ def _edit(node: Node, check: bool, mend: bool, folder: Path | None) -> Edit:
         options["parent"] = _name(keys["parent"], mend)
     if "enabled" in keys:
         options["enabled"] = keys["enabled"].boolean()
+    if "grade" in keys and not keys["grade"].is_null:
+        options["grading"] = parse_grade(keys["grade"])
     if "feather" in keys:
         options["feather"] = keys["feather"].number()
     items = keys["operations"].items() if "operations" in keys else []
@@ -369,6 +375,8 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
         content["relight"] = edit.relight
     if edit.feather != DEFAULT_FEATHER_VOXELS:
         content["feather"] = edit.feather
+    if edit.is_graded:
+        content["grade"] = dump_grade(edit.grading)
     if settings.lattice is not None:
         content["lattice"] = settings.lattice
     if not edit.enabled:

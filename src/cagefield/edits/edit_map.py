@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cagefield.edits.edit import Edit, Paste, bounds_of
-from cagefield.edits.mapped_samples import CanonicalSamples, DeformedPoints, KernelSamples
+from cagefield.edits.mapped_samples import CanonicalSamples, DeformedPoints, KernelSamples, SampleGrade
 from cagefield.edits.prepared import PreparedEdit
 from cagefield.errors import EditError
 from cagefield.fields.voxel_field import VoxelField
@@ -66,6 +66,11 @@ class EditMap(SpaceMap):
         return tuple(layer for step in self.steps for layer in step.layers)
 
     @property
+    def is_graded(self) -> bool:
+        """True where an active edit changes color or opacity."""
+        return any(step.edit.is_graded for step in self.steps)
+
+    @property
     def places(self) -> tuple[int, ...]:
         """The places of the layers (`fields.voxel_layers`)."""
         return layer_x_offsets(self.layers)
@@ -108,10 +113,15 @@ class EditMap(SpaceMap):
         J = np.tile(np.eye(3), (len(p), 1, 1))
         layer = np.zeros(len(p), dtype=np.int64)
         number = 1 + len(self.layers)
+        grade = SampleGrade.neutral(len(p)) if self.is_graded else None
         for step in reversed(self.steps):
             rows = np.flatnonzero(_in_any(step.boxes, p) & (layer == 0))
             mapped = step.warp.to_canonical(p[rows])
             p[rows], J[rows] = mapped.points, mapped.jacobian @ J[rows]
+            if grade is not None and step.edit.is_graded:
+                weights = step.edit.grade_weights(mapped.points, mapped.inside)
+                grade.colors[rows] = grade.colors[rows] @ step.edit.grading.matrices(weights)
+                grade.density[rows] *= step.edit.grading.density_factors(weights)
             number -= len(step.layers)
             layer[rows[mapped.lost]] = number if step.under is not None else -1
             if step.part is not None:
@@ -119,13 +129,14 @@ class EditMap(SpaceMap):
             elif isinstance(step.edit, Paste):
                 raise step.unread()
         if viewdirs is None:
-            return CanonicalSamples(p, None, None, J, layer)
+            return CanonicalSamples(p, None, None, J, layer, grade)
         d = _points(viewdirs, "viewdirs")
         if d.shape != p.shape:
             raise EditError(f"viewdirs must have the shape of points, {list(p.shape)}, got {list(d.shape)}")
         along = np.einsum("nij,nj->ni", J, d)
         length = np.linalg.norm(along, axis=1)
-        return CanonicalSamples(p, along / length[:, None], length / np.linalg.norm(d, axis=1), J, layer)
+        stretch = length / np.linalg.norm(d, axis=1)
+        return CanonicalSamples(p, along / length[:, None], stretch, J, layer, grade)
 
     def to_deformed(self, points: ArrayLike) -> DeformedPoints:
         """Deformed positions of canonical points [N,3]; the forward map.

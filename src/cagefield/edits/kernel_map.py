@@ -41,4 +41,5 @@ class KernelMap(SpaceMap):
         layer = np.minimum(places, 0).astype(np.int64)
         for number, place in enumerate(self.edits.places, start=1):
             layer[places == place] = number
-        return KernelSamples(canonical, along, stretch, layer)
+        grade = self._packed.grade(p) if self._packed.is_graded else None
+        return KernelSamples(canonical, along, stretch, layer, grade)

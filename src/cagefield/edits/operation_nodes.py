@@ -31,6 +31,7 @@ def parse_operation(node: Node) -> Operation:
         "bend",
         "twist",
         "taper",
+        "mirror",
     )
     keys = node.mapping(optional=names)
     if len(keys) != 1:
@@ -39,6 +40,8 @@ def parse_operation(node: Node) -> Operation:
             " start each operation with its own dash"
         )
     name, value = next(iter(keys.items()))
+    if name == "mirror":
+        return operations.Mirror(value.choice(LATTICE_AXES))
     if name == "translate":
         return operations.Translate(value.vector())
     if name in ("rotate_deg", "scale"):
@@ -93,6 +96,8 @@ def _fixed(parts: dict[str, Node]) -> str:
 
 def dump_operation(operation: Operation) -> dict[str, Any]:
     """The mapping that `parse_operation` reads."""
+    if isinstance(operation, operations.Mirror):
+        return {"mirror": operation.axis}
     if isinstance(operation, operations.Translate):
         return {"translate": list(operation.by)}
     if isinstance(operation, operations.Rotate):

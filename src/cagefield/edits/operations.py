@@ -6,14 +6,16 @@ shears times t, angles of rotations, bends and twists times t, factors of scalin
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, fields, replace
 from typing import ClassVar, TypeAlias, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from cagefield.edits.angles import degrees as degrees
+from cagefield.edits.angles import euler_degrees as euler_degrees
+from cagefield.edits.mirror import Mirror as Mirror
 from cagefield.errors import CageError
 from cagefield.geometry.cage import FACES, Axes, Cage, LatticeCage
 from cagefield.geometry.cage_checks import factors, vector
@@ -74,13 +76,6 @@ class Rotate:
 
     def __str__(self) -> str:
         return f"by {_show(self.degrees)} degrees"
-
-
-def euler_degrees(rotation: Rotation) -> NDArray[np.float64]:
-    """Intrinsic XYZ angles [3] in degrees; in gimbal lock the last one is 0, without SciPy's warning."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)
-        return np.asarray(rotation.as_euler("XYZ", degrees=True))
 
 
 @dataclass(frozen=True)
@@ -373,14 +368,8 @@ Operation: TypeAlias = (
     | Bend
     | Twist
     | Taper
+    | Mirror
 )
-
-
-def degrees(radians: float) -> float:
-    """An angle in degrees; within rounding of a short decimal number it becomes that number."""
-    angle = float(np.degrees(radians))
-    short = round(angle, 9)
-    return short if abs(angle - short) <= 4e-16 * abs(angle) else angle
 
 
 def displacement(by: ArrayLike, name: str) -> Triple:

@@ -12,7 +12,7 @@ MIN_SHOWN_SHARE = 0.5
 
 
 def partial_edit(edit: Edit, share: float) -> Edit | None:
-    """The edit with each of its operations done to a share in [0,1]; None where it shows nothing there.
+    """The edit with its operations and its grade done to a share in [0,1]; None where it shows nothing there.
 
     Raises `EditError` where an operation leads, at that share, to an impossible cage.
     """
@@ -20,7 +20,10 @@ def partial_edit(edit: Edit, share: float) -> Edit | None:
         return edit if share >= MIN_SHOWN_SHARE else None
     if share >= 1.0:
         return edit
-    there = edit.replace(operations=tuple(operation.part(share) for operation in edit.operations))
+    there = edit.replace(
+        operations=tuple(operation.part(share) for operation in edit.operations),
+        grading=edit.grading.part(share),
+    )
     outer = edit.shell_settings.outer
     if outer is None or not outer.follows_edit:
         return there

@@ -14,7 +14,6 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.typing import Array
 from cagefield.warps import Warp
 from cagefield.warps.discrete import DiscreteWarp
-from cagefield.warps.hexahedron_map import HexahedronMap
 
 
 @dataclass(frozen=True)
@@ -100,5 +99,5 @@ class PreparedEdit:
         if self.is_bare or not isinstance(warp, DiscreteWarp) or not isinstance(self.edit, Discrete):
             return warp
         if self.pasted is not None and self.pasted.place is not None:
-            warp = replace(warp, inner=HexahedronMap(self.pasted.place, self.edit.deformed))
+            warp = replace(warp, inner=self.edit.map_between(self.pasted.place, self.edit.deformed))
         return replace(warp, patched=None if self.patch is None else self.patch.read_instead)

@@ -198,6 +198,16 @@ def _rows(edit: Edit, row: NDArray[np.float32], first_node: int) -> Float32:
         (at.PART_SCALAR, row[p.PART_PLACE]),
     ):
         out[scalar, 3] = value
+    if row[p.GRADED] > 0.5:
+        grade = np.concatenate(
+            [
+                row[p.GRADE_MATRIX : p.GRADE_MATRIX + 9],
+                [row[p.GRADE_DENSITY] + 1.0],
+                row[p.GRADE_INNER : p.GRADE_INNER + 24],
+            ]
+        )
+        k = np.arange(at.GRADE_COUNT)
+        out[at.GRADE_SCALARS + k + (k >= at.GRADE_FIRST_PART), 3] = grade
     for number in range(2):
         record = row[p.RECORDS + number * p.RECORD : p.RECORDS + (number + 1) * p.RECORD]
         first = at.HEXAHEDRON + number * at.HEXAHEDRON_ROWS

@@ -9,9 +9,9 @@ field, in the page's order, and M that come (moved ones, copies, the children of
     covariances  [M, 6] float32: xx, xy, xz, yy, yz, zz
     opacities    [2, M] uint8, high bytes first, of 65535 o
     gains        [M] int32: factors of the red, green and blue of a source's color, see
-                 `encode_gains`
-    turns        [2, 3, M] uint8, see `page_splats.encode_rotations`: R; colours are those of the source seen
-                 along R^T d
+                 `encode_gains`; or, where an edit grades colors, [4, M], matrices: see `encode_colors`
+    turns        [2, 3, M] uint8, see `page_splats.encode_orthogonals`: R; colours are those of the source
+                 seen along R^T d
 
 Where the header says `packed`, sources rise, and in the place of means and covariances there are `chunks`,
 `means`, `rotations` and `scales` as in `page_splats`, of the splats' axes in deformed space: half the bytes,
@@ -42,7 +42,7 @@ from cagefield.pages.page_splats import (
     decode_rotations,
     decode_shapes,
     encode_means,
-    encode_rotations,
+    encode_orthogonals,
     encode_shapes,
     from_byte_pairs,
     page_order,
@@ -56,7 +56,8 @@ MAGIC, VERSION = b"cagesped", 2
 @dataclass(frozen=True)
 class PageSplatEdits:
     """Decoded file: hidden [N], sources [M], means [M,3] less the centre, covariances [M,6], opacities
-    [M], turns [M,4] (w, x, y, z), gains [M,3]."""
+    [M], turns [M,4] (w, x, y, z), gains [M,3]; colors [M,3,3] in place of gains where an edit grades them;
+    mirrored [M], True where the orthogonal matrix is minus that of the turn."""
 
     hidden: NDArray[np.bool_]
     sources: NDArray[np.int32]
@@ -65,6 +66,8 @@ class PageSplatEdits:
     opacities: Float32
     turns: Float32
     gains: Float32
+    colors: Float32 | None = None
+    mirrored: NDArray[np.bool_] | None = None
 
 
 def encode_page_splat_edits(field: SplatField, changed: ChangedSplats, *, packed: bool = False) -> bytes:
@@ -89,9 +92,9 @@ def encode_page_splat_edits(field: SplatField, changed: ChangedSplats, *, packed
         arrays["means"] = (splats.means.astype(np.float64) - field.center).astype(np.float32)
         arrays["covariances"] = splats.covariances
         arrays["opacities"] = byte_pairs(np.round(65535.0 * splats.opacities.astype(np.float64)))
-    quaternions = np.broadcast_to(quaternions_from_matrices(turns), (len(splats), 4))[rows]
-    arrays["turns"] = encode_rotations(quaternions, bits=ROTATION_BITS if packed else 15)
-    arrays["gains"] = gains_of(changed)[rows]
+    orthogonals = np.broadcast_to(turns, (len(splats), 3, 3))[rows]
+    arrays["turns"] = encode_orthogonals(orthogonals, bits=ROTATION_BITS if packed else 15)
+    arrays["gains"] = gains_of(changed)[..., rows]
     return pack(MAGIC, VERSION, header, arrays, level=LEVEL if packed else QUICK_LEVEL)
 
 
@@ -108,10 +111,9 @@ GAIN_STEP = 1.0 / 128.0
 
 
 def gains_of(changed: ChangedSplats) -> NDArray[np.int32]:
-    """The encoded gains [M] of changed splats."""
-    return encode_gains(
-        np.ones((len(changed.sources), 3), np.float32) if changed.gains is None else changed.gains
-    )
+    """The encoded gains [M] of changed splats, or their matrices [4,M] where an edit grades colors."""
+    gains = np.ones((len(changed.sources), 3), np.float32) if changed.gains is None else changed.gains
+    return encode_gains(gains) if changed.colors is None else encode_colors(changed.colors * gains[:, None])
 
 
 def encode_gains(gains: Float32) -> NDArray[np.int32]:
@@ -124,6 +126,41 @@ def decode_gains(codes: NDArray[np.int32]) -> Float32:
     """Gains [M,3] from codes of `encode_gains`."""
     parts = codes[:, None] >> np.array([0, 10, 20], np.int32) & np.int32(1023)
     return np.asarray(np.exp2((parts.astype(np.float32) - 512.0) * GAIN_STEP), np.float32)
+
+
+COLOR_RANGES = np.array([0.0, 2.0, 8.0, 32.0])
+"""Largest entry of an encoded color matrix, for the values 1 to 3 of its two highest bits."""
+
+
+def encode_colors(matrices: Float32) -> NDArray[np.int32]:
+    """Color matrices [M,3,3] as [4,M]: nine entries q = 8192 + 8191 m / range, 14 bits each.
+
+    Row by row, word n has entries 2 n (bits 0 to 13) and 2 n + 1 (14 to 27). The last entry has its bits 0
+    to 3 in bits 28 to 31 of word 1, 4 to 7 in those of word 2, 8 to 11 in those of word 3, and 12 and 13 in
+    bits 28 and 29 of word 0, whose bits 30 and 31 say which of COLOR_RANGES is the range; gains have 0
+    there.
+    """
+    m = matrices.reshape(-1, 9).astype(np.float64)
+    largest = np.abs(m).max(axis=1, initial=0.0)
+    kind = np.clip(np.searchsorted(COLOR_RANGES, largest), 1, 3)
+    q = np.round(8192 + 8191 * m / COLOR_RANGES[kind][:, None])
+    q = np.clip(q, 0, 16383).astype(np.uint32)
+    words = [q[:, 2 * n] | q[:, 2 * n + 1] << np.uint32(14) for n in range(4)]
+    words[0] |= q[:, 8] >> np.uint32(12) << np.uint32(28) | kind.astype(np.uint32) << np.uint32(30)
+    for n in range(1, 4):
+        words[n] |= (q[:, 8] >> np.uint32(4 * (n - 1)) & np.uint32(15)) << np.uint32(28)
+    return np.stack(words).view(np.int32)
+
+
+def decode_colors(codes: NDArray[np.int32]) -> Float32:
+    """Color matrices [M,3,3] from codes [4,M] of `encode_colors`."""
+    words = np.ascontiguousarray(codes).view(np.uint32)
+    q = np.empty((words.shape[1], 9), np.uint32)
+    q[:, 0:8:2], q[:, 1:8:2] = (words & 16383).T, (words >> 14 & 16383).T
+    last = [words[0] >> 28 & 3, *(words[n] >> 28 for n in (3, 2, 1))]
+    q[:, 8] = last[0] << 12 | last[1] << 8 | last[2] << 4 | last[3]
+    size = COLOR_RANGES[words[0] >> 30][:, None]
+    return np.asarray((q.astype(np.float64) - 8192) / 8191 * size, np.float32).reshape(-1, 3, 3)
 
 
 def decode_page_splat_edits(data: bytes) -> PageSplatEdits:
@@ -141,7 +178,7 @@ def decode_page_splat_edits(data: bytes) -> PageSplatEdits:
             "means": (len(arrays["means"]), 3, changed) if packed else (changed, 3),
             "opacities": (2, changed),
             "turns": (2, 3, changed),
-            "gains": (changed,),
+            "gains": (4, changed) if arrays["gains"].ndim == 2 else (changed,),
         }
         if packed:
             pairs, chunks = (2, 3, changed), (-(-changed // CHUNK), 2, 3)
@@ -167,5 +204,7 @@ def decode_page_splat_edits(data: bytes) -> PageSplatEdits:
         parts["covariances"],
         opacities,
         decode_rotations(parts["turns"]),
-        decode_gains(parts["gains"]),
+        decode_gains(parts["gains"]) if parts["gains"].ndim == 1 else np.ones((changed, 3), np.float32),
+        decode_colors(parts["gains"]) if parts["gains"].ndim == 2 else None,
+        parts["turns"][0, 2] >= 128,
     )

@@ -6,7 +6,7 @@
     sources.k    [M] int32, rising: the splats whose colours the state's splats have
     rotations.k, scales.k   as in `page_splats`: canonical shapes, before the edits
     opacities.k  [2, M] uint8, as there
-    gains.k      [M] int32, as in `page_splat_edits`
+    gains.k      [M] int32, or [4, M], as in `page_splat_edits`
     moves.n      [2, 12, M] uint8, high bytes first: of state n, three rows of means, three of turns, six of
                  stretches
 
@@ -14,7 +14,7 @@ Entry n of the header's `hidden`, `sources`, `rotations`, `scales`, `opacities` 
 state n has.
 
 Of the rows of moves, means are low + step q, in deformed space less the field's centre, with the header's
-`low` and `step`, which all states share. Turns are as in `page_splats.encode_rotations`. Stretches are
+`low` and `step`, which all states share. Turns are as in `page_splats.encode_orthogonals`. Stretches are
 1 + STRETCH (q - 32768) on the diagonal, STRETCH (q - 32768) beside it: xx, xy, xz, yy, yz, zz. With a turn R,
 a stretch S and the canonical covariance C, J = R S is the map's Jacobian and R S C S R^T the splat's
 covariance there. The file has the differences of the numbers q to those of the state before, if it has the
@@ -40,7 +40,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.fields.splat_field import SplatField
-from cagefield.geometry.quaternions import quaternions_from_matrices
 from cagefield.pages.page_file import pack
 from cagefield.pages.page_splat_edits import gains_of
 from cagefield.pages.page_splats import (
@@ -48,7 +47,7 @@ from cagefield.pages.page_splats import (
     ROTATION_BITS,
     SCALES,
     byte_pairs,
-    encode_rotations,
+    encode_orthogonals,
     encode_shapes,
     from_byte_pairs,
     page_order,
@@ -72,9 +71,9 @@ STRETCH = 1.0 / 256.0
 class SplatPathState:
     """Difference that edits make at one moment: hidden [ceil(N/8)] and sources [M] as in the file.
 
-    Of each splat: means [M,3], less the field's centre; turns [M,4] (w, x, y, z) and stretches [M,3,3], R and
+    Of each splat: means [M,3], less the field's centre; turns and stretches [M,3,3], R and
     S of the map's Jacobian R S; its own shape, quaternions [M,4] and log_scales [M,3]; opacities [M]; encoded
-    gains [M].
+    gains [M] or [4,M].
     """
 
     hidden: NDArray[np.uint8]
@@ -105,12 +104,12 @@ class SplatPathState:
             np.packbits(changed.hidden[order], bitorder="little"),
             sources[rows],
             splats.means[rows].astype(np.float64) - field.center,
-            np.asarray(quaternions_from_matrices(turns), np.float64),
+            turns,
             0.5 * (stretches + stretches.transpose(0, 2, 1)),
             np.concatenate([each.quaternions for each in fields])[made_of],
             np.concatenate([each.log_scales for each in fields])[made_of],
             splats.opacities[rows],
-            gains_of(changed)[rows],
+            gains_of(changed)[..., rows],
         )
 
 
@@ -171,7 +170,7 @@ def encode_page_splat_path(
 def _moves(state: SplatPathState, low: NDArray[np.float64], step: float) -> NDArray[np.int64]:
     """The numbers q [12,M] of a state's means, turns and stretches."""
     means = np.round((state.means - low) / step)
-    turns = from_byte_pairs(encode_rotations(state.turns, bits=ROTATION_BITS))
+    turns = from_byte_pairs(encode_orthogonals(state.turns, bits=ROTATION_BITS))
     six = (state.stretches - np.eye(3)).reshape(-1, 9)[:, [0, 1, 2, 4, 5, 8]]
     stretches = np.clip(32768 + np.round(six / STRETCH), 0, 65535)
     return np.concatenate([means.T, turns, stretches.T]).astype(np.int64)

@@ -34,6 +34,7 @@ from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.errors import FieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats.morton import morton_codes
+from cagefield.geometry.quaternions import quaternions_from_matrices
 from cagefield.pages.page_file import pack, unpack
 from cagefield.rendering.splats.rasterizer import near_depth
 from cagefield.rendering.splats.splat_provenance import SplatSet
@@ -234,6 +235,17 @@ def encode_rotations(quaternions: AnyArray, bits: int = ROTATION_BITS) -> NDArra
     codes[:, 0] |= ((left & 1) << 15).astype(np.uint16)
     codes[:, 1] |= ((left >> 1) << 15).astype(np.uint16)
     return byte_pairs(codes.T)
+
+
+def encode_orthogonals(matrices: AnyArray, bits: int = ROTATION_BITS) -> NDArray[np.uint8]:
+    """Orthogonal matrices [M,3,3] as [2,3,M]: of a reflection O the rotation -O, with the third number's
+    highest bit set.
+    """
+    turned_over = np.linalg.det(matrices) < 0.0
+    rotations = np.where(turned_over[:, None, None], -matrices, matrices)
+    pairs = encode_rotations(quaternions_from_matrices(rotations), bits)
+    pairs[0, 2] |= np.where(turned_over, np.uint8(128), np.uint8(0))
+    return pairs
 
 
 def decode_rotations(pairs: NDArray[np.uint8]) -> Float32:

@@ -32,6 +32,17 @@ AFFINE_SCALAR = 0
 """1 for an affine hexahedron."""
 
 HEXAHEDRON_ROWS = 18
+
+GRADE_SCALARS = 9
+"""First row of the numbers of an edit's grade (`edits.grade`), in the w of rows that have a free one: number
+k is that of row GRADE_SCALARS + k, from k = 17 on that of the row after. They are the matrix [3,3], the
+factor of density plus 1 (0 where the edit does not grade), and of a continuous edit the frames of its
+`GradeFalloff`, [4,3] of the inner and of the outer cage."""
+
+GRADE_DENSITY, GRADE_INNER, GRADE_OUTER, GRADE_COUNT, GRADE_FIRST_PART = 9, 10, 22, 34, 17
+"""Numbers of a grade: places of the density factor and of the frames, their count, and how many come before
+the second hexahedron."""
+
 EDIT_ROWS = HEXAHEDRON + 2 * HEXAHEDRON_ROWS
 BOX_ROWS = 2
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.edits import EditMap, SpaceMap
+from cagefield.edits.grade import grade_colors
 from cagefield.errors import FieldError
 from cagefield.fields.protocol import Field
 from cagefield.typing import Array, Float32
@@ -45,6 +46,9 @@ class EditedField:
                 sigma[rows], rgb[rows] = evaluate(field, points[rows], along[rows])
                 if self.preserve_opacity:
                     sigma[rows] *= np.asarray(mapped.stretch[rows], np.float32)
+                if mapped.grade is not None:
+                    sigma[rows] *= mapped.grade.density[rows].astype(np.float32)
+                    rgb[rows] = grade_colors(rgb[rows], mapped.grade.colors[rows])
         emptied = np.flatnonzero((mapped.layer < 0) & np.isfinite(points).all(axis=1))
         if len(emptied):
             rgb[emptied] = evaluate(self.field, points[emptied], along[emptied])[1]

@@ -40,6 +40,7 @@ export function apply(operation: Operation, cage: Posed): Posed {
     case "bend":
     case "twist":
     case "taper":
+    case "mirror":
       return cage;
   }
 }
@@ -68,6 +69,8 @@ export function scaleOperation(operation: Operation, t: number): Operation {
       return { ...operation, degrees: t * operation.degrees };
     case "taper":
       return { ...operation, factor: operation.factor ** t };
+    case "mirror":
+      return operation;
   }
 }
 
@@ -94,6 +97,8 @@ export function operationSize(operation: Operation): number {
       return Math.abs(operation.degrees);
     case "taper":
       return Math.abs(Math.log(operation.factor));
+    case "mirror":
+      return 1;
   }
 }
 
@@ -125,6 +130,7 @@ export function snapOperation(operation: Operation, steps: SnapSteps): Operation
     case "bend":
     case "twist":
     case "taper":
+    case "mirror":
       return operation;
   }
 }
@@ -154,6 +160,7 @@ export function describeOperation(operation: Operation): string {
     case "bend":
     case "twist":
     case "taper":
+    case "mirror":
       return operation.kind;
   }
 }

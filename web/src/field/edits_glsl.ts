@@ -155,6 +155,67 @@ int mapEdit(int e, inout vec3 p, inout vec3 v) {
 }
 
 MAP_SAMPLE
+#ifdef GRADED
+// Number k of the grade of the edit whose rows begin at e.
+float gradeNumber(int e, int k) { return rows[e + GRADE_SCALARS + (k < GRADE_FIRST_PART ? k : k + 1)].w; }
+
+vec3 gradeVector(int e, int k) { return vec3(gradeNumber(e, k), gradeNumber(e, k + 1), gradeNumber(e, k + 2)); }
+
+// Coordinates in the frame at number k, without signs, and the distances of its pairs of faces from its center.
+vec3 framed(int e, int k, vec3 q, out vec3 half_) {
+  vec3 by = q - gradeVector(e, k + 9);
+  vec3 x = gradeVector(e, k);
+  vec3 y = gradeVector(e, k + 3);
+  vec3 z = gradeVector(e, k + 6);
+  half_ = 1.0 / vec3(length(x), length(y), length(z));
+  return abs(vec3(dot(x, by), dot(y, by), dot(z, by)));
+}
+
+float falloffWeight(int e, vec3 q) {
+  vec3 h;
+  vec3 H;
+  vec3 xi = framed(e, GRADE_INNER, q, h);
+  if (largest(xi) <= 1.0) return 1.0;
+  vec3 z = framed(e, GRADE_OUTER, q, H);
+  if (largest(z) >= 1.0) return 0.0;
+  vec3 a = h * max(xi - 1.0, 0.0);
+  vec3 b = 0.5 * H * max(1.0 - z * z, 1e-6);
+  a *= a;
+  b *= b;
+  float inner = sqrt(sqrt(dot(a, a)));
+  float outer = inversesqrt(sqrt(dot(1.0 / b, 1.0 / b)));
+  float g = outer / (inner + outer);
+  return g * g * (3.0 - 2.0 * g);
+}
+
+// The matrix of a sample's color by the edits' grades, and the factor of its density.
+mat3 gradeSample(vec3 p, out float density) {
+  mat3 colors = mat3(1.0);
+  density = 1.0;
+  int place = 0;
+  vec3 v = vec3(0.0, 0.0, 1.0);
+  for (int n = editCount - 1; n >= 0; n--) {
+    int e = n * EDIT_ROWS;
+    if (place != 0 || !inBox(p, rows[e + BOX_VECTOR].xyz, rows[e + BOX_VECTOR + 1].xyz)) continue;
+    bool graded = gradeNumber(e, GRADE_DENSITY) > 0.5;
+    bool continuous = rows[e + CONTINUOUS_SCALAR].w > 0.5;
+    float weight = 0.0;
+    if (graded && !continuous && rows[e + FIRST_SCALAR].w < 0.5) {
+      float error;
+      hexahedron(p, e + HEXAHEDRON, error);
+      if (error <= EDGE) weight = 1.0;
+    }
+    place = mapEdit(e, p, v);
+    if (graded && continuous) weight = falloffWeight(e, p);
+    if (weight > 0.0) {
+      mat3 step_ = transpose(mat3(gradeVector(e, 0), gradeVector(e, 3), gradeVector(e, 6)));
+      colors = colors * (mat3(1.0) + weight * (step_ - mat3(1.0)));
+      density *= 1.0 + weight * (gradeNumber(e, GRADE_DENSITY) - 2.0);
+    }
+  }
+  return colors;
+}
+#endif
 // The interval of a ray outside which no edit has an effect.
 vec2 editedPart(vec3 origin, vec3 d) {
   vec2 part = vec2(1e30, -1e30);
@@ -188,6 +249,13 @@ const MAX_UNROLLED_EDITS = 2;
 /** Number of edits of an unrolled shader; null for a shader with a loop. */
 export function unrolledEdits(edits: number): number | null {
   return edits <= MAX_UNROLLED_EDITS ? edits : null;
+}
+
+/** Whether an edit of a page grades colors: the shader leaves the code out where none does. */
+export function isGraded(rows: Float32Array, edits: number): boolean {
+  const at = EDIT_LAYOUT.GRADE_SCALARS + EDIT_LAYOUT.GRADE_DENSITY;
+  for (let e = 0; e < edits; e++) if (rows[4 * (e * EDIT_LAYOUT.EDIT_ROWS + at) + 3] > 0.5) return true;
+  return false;
 }
 
 /** GLSL source for a number of edits; see `unrolledEdits`. */

@@ -10,7 +10,7 @@
  *
  * Drawing changes the state of the context: three.js needs `resetState()` afterwards.
  */
-import { unrolledEdits } from "./edits_glsl";
+import { isGraded, unrolledEdits } from "./edits_glsl";
 import { EditTextures } from "./edits_on_gpu";
 import { OutOfMemory, createProgram } from "./gl";
 import type { Program } from "./gl";
@@ -149,6 +149,7 @@ export class FieldRenderer implements SceneDrawer<PageEdits> {
       edited: active !== null,
       edits: active && unrolledEdits(active.edits),
       normals: options.normals ?? false,
+      graded: active !== null && isGraded(active.rows, active.edits),
       count: options.count ?? false,
     };
     const { program, uniform } = this.program(variant, level.field.brick);

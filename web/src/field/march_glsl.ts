@@ -15,6 +15,8 @@ export interface MarchVariant {
   /** Number of edits in the unrolled loop; null for a loop. */
   edits: number | null;
   normals: boolean;
+  /** Whether edits grade colors. */
+  graded: boolean;
   /** Writes counts in place of depth: 65536 * (texture reads / 4) + samples. */
   count?: boolean;
 }
@@ -226,6 +228,14 @@ void main() {
 #ifdef EDITED
         if (moved && preserveOpacity) raw *= length(view);
 #endif
+#ifdef GRADED
+        mat3 grade = mat3(1.0);
+        if (t >= edited.x && t <= edited.y) {
+          float thickness;
+          grade = gradeSample(eye + t * d, thickness);
+          raw *= thickness;
+        }
+#endif
         float keep = exp(-raw * h);
         float w = T * (1.0 - keep);
         T *= keep;
@@ -234,7 +244,11 @@ void main() {
 #ifdef COUNT
           reads += COLORS;
 #endif
-          rgb += w * clamp(c, 0.0, 1.0);
+          c = clamp(c, 0.0, 1.0);
+#ifdef GRADED
+          c = clamp(grade * c, 0.0, 1.0);
+#endif
+          rgb += w * c;
           depth += w * t;
 #ifdef NORMALS
           vec3 slope = densitySlope(texel, corner);
@@ -277,6 +291,7 @@ export function marchShader(variant: MarchVariant, brick: number): string {
   ];
   if (variant.contracted) defines.push("#define CONTRACTED");
   if (variant.edited) defines.push("#define EDITED");
+  if (variant.edited && variant.graded) defines.push("#define GRADED");
   if (variant.normals) defines.push("#define NORMALS");
   if (variant.count) defines.push("#define COUNT");
   return [

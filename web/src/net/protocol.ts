@@ -72,7 +72,8 @@ export interface Apply {
     | MovePointsBy
     | BendBy
     | TwistBy
-    | TaperBy;
+    | TaperBy
+    | MirrorBy;
 }
 /**
  * Move the cage.
@@ -165,6 +166,13 @@ export interface TaperBy {
   fixed?: "start" | "middle" | "end";
 }
 /**
+ * Reflect the content of a move, a copy or a paste along an axis of its cage.
+ */
+export interface MirrorBy {
+  kind: "mirror";
+  axis: "x" | "y" | "z";
+}
+/**
  * A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying), its "grid"; "path".
  *
  * The "path" is the camera path between its keyframes, as its video goes; "sources" are the scenes and files
@@ -221,6 +229,18 @@ export interface Change {
    * the edit that carries this one; 0: none
    */
   parent?: number | null;
+  grade?: GradeValues | null;
+}
+/**
+ * All values of an edit's `Grade`.
+ */
+export interface GradeValues {
+  exposure: number;
+  temperature: number;
+  tint: number;
+  saturation: number;
+  hue_deg: number;
+  opacity: number;
 }
 /**
  * Selects all or none, inverts the selection, or grows or shrinks it by a cell.
@@ -287,7 +307,8 @@ export interface DragEnd {
     | MovePointsBy
     | BendBy
     | TwistBy
-    | TaperBy;
+    | TaperBy
+    | MirrorBy;
 }
 /**
  * Where the drag is: the whole operation since its beginning.
@@ -306,7 +327,8 @@ export interface DragMove {
     | MovePointsBy
     | BendBy
     | TwistBy
-    | TaperBy;
+    | TaperBy
+    | MirrorBy;
 }
 /**
  * Images that the page draws itself: none, those during motion, or all. It receives the edits instead.
@@ -653,6 +675,7 @@ export interface EditState {
   inner_pivot: Vec3;
   outer_pivot: Vec3 | null;
   operations: string[];
+  grade: GradeValues;
   parent: number | null;
   carrier: number[] | null;
   problem: string | null;

@@ -61,6 +61,20 @@ vec4 rotation(uvec2 words) {
 
 vec3 rotated(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
 
+// The matrix of a changed splat's color: its gains, or a grade; see page_splat_edits.encode_gains and encode_colors.
+mat3 colorMatrix(uvec4 words) {
+  uint kind = words.x >> 30;
+  if (kind == 0u) {
+    vec3 gain = exp2((vec3(words.x & 1023u, words.x >> 10 & 1023u, words.x >> 20) - 512.0) / 128.0);
+    return mat3(gain.x, 0.0, 0.0, 0.0, gain.y, 0.0, 0.0, 0.0, gain.z);
+  }
+  uvec4 even = words & 16383u, odd = words >> 14 & 16383u;
+  uint last = (words.x >> 28 & 3u) << 12 | (words.w >> 28) << 8 | (words.z >> 28) << 4 | words.y >> 28;
+  mat3 codes = mat3(even.x, odd.y, even.w, odd.x, even.z, odd.w, even.y, odd.z, last);
+  float range = kind == 1u ? 2.0 : kind == 2u ? 8.0 : 32.0;
+  return range / 8191.0 * (codes - mat3(8192, 8192, 8192, 8192, 8192, 8192, 8192, 8192, 8192));
+}
+
 mat3 cholesky(float xx, float xy, float xz, float yy, float yz, float zz) {
   float a = sqrt(max(xx, 1e-38));
   float b = xy / a, c = xz / a;
@@ -85,7 +99,8 @@ void main() {
   mat3 F;
   float o;
   vec4 turn = vec4(0.0, 0.0, 0.0, 1.0);
-  vec3 gain = vec3(1.0);
+  float side = 1.0;             // -1 where the turn is that of a reflection, turned over
+  mat3 grade = mat3(1.0);
   if (splat < own) {
     uvec4 first = texel(records, 2u * splat), second = texel(records, 2u * splat + 1u);
     mean = uintBitsToFloat(first.xyz);
@@ -101,9 +116,9 @@ void main() {
     vec4 C = uintBitsToFloat(second);
     F = cholesky(C.x, C.y, C.z, C.w, uintBitsToFloat(third.x), uintBitsToFloat(third.y));
     turn = rotation(third.zw);
+    side = (third.w & 32768u) == 0u ? 1.0 : -1.0;
     o = float(third.w >> 16) / 65535.0;
-    uint gains = texel(changed, n + 3u).x;
-    gain = exp2((vec3(gains & 1023u, gains >> 10 & 1023u, gains >> 20) - 512.0) / 128.0);
+    grade = colorMatrix(texel(changed, n + 3u));
   }
   vec3 offset = mean - eye;
   vec3 p = W * offset;
@@ -136,8 +151,8 @@ void main() {
   vec3 axis = flattest(F);
   normal = floatBitsToUint(vec4(dot(axis, d) > 0.0 ? -axis : axis, 0.0));
 #endif
-  d = rotated(vec4(-turn.xyz, turn.w), d);
-  tint = floatBitsToUint(vec4(gain * max(colorOf(source, d), 0.0), slope.y));
+  d = side * rotated(vec4(-turn.xyz, turn.w), d);
+  tint = floatBitsToUint(vec4(max(grade * colorOf(source, d), 0.0), slope.y));
 }
 `;
 

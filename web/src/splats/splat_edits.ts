@@ -8,7 +8,8 @@ const VERSION = 2;
 
 /**
  * Number of 32-bit words in the record of a changed splat: the floats of the mean, and the splat whose harmonics it has;
- * the floats of the covariance (xx, xy, xz, yy | yz, zz); rotation and opacity; the gain of its color, and three unused.
+ * the floats of the covariance (xx, xy, xz, yy | yz, zz); rotation and opacity; the gain of its color and three unused, or
+ * the matrix of a graded color (`encode_colors` in Python).
  */
 export const CHANGED_WORDS = 16;
 
@@ -69,7 +70,7 @@ export function unpackBits(bits: Uint8Array, count: number): Uint8Array<ArrayBuf
 
 /**
  * The records of M changed splats: sources [M], means [M, 3], covariances [M, 6], opacities [M], turns [3,
- * M], gains [M].
+ * M], gains [M], or color matrices [4, M].
  */
 export function encodeChangedRecords(
   sources: Int32Array,
@@ -89,7 +90,7 @@ export function encodeChangedRecords(
     for (let k = 0; k < 6; k++) records[at + 4 + k] = covariance[6 * n + k];
     records[at + 10] = turns[n] | (turns[changed + n] << 16);
     records[at + 11] = turns[2 * changed + n] | (opacities[n] << 16);
-    records[at + 12] = gains[n];
+    for (let k = 0; changed * k < gains.length; k++) records[at + 12 + k] = gains[changed * k + n];
   }
   return records;
 }

@@ -9,6 +9,8 @@ import { roundDecimals, type Operation } from "../editing/operations";
 import type { Change, EditState, Vec3 } from "../net/protocol";
 import { canFill, canRelight, selectedEdit, dragTarget } from "../app/store";
 import { h, section } from "./dom";
+import { gradeOptions } from "./grade_options";
+import { mirrorOptions } from "./mirror_options";
 import { parentRow } from "./parent_row";
 import { pointOptions } from "./point_options";
 
@@ -125,6 +127,9 @@ export function options(app: App, actions: Actions): HTMLElement {
     if (!filling) app.send({ type: "scene_change", preserve_opacity: value });
   });
 
+  const mirror = mirrorOptions(pane, applyNow);
+  const grade = gradeOptions(pane, (values) => change({ grade: values }));
+
   const cages = pane.addFolder({ title: "Cages" });
   cages.addButton({ title: "Fit the inner cage (I)" }).on("click", () => actions.fitInner());
   cages.addBinding(model, "margin", { label: "Margin", min: 0.001, format: short });
@@ -195,6 +200,8 @@ export function options(app: App, actions: Actions): HTMLElement {
     filling = true;
     points.show(edit);
     parents.show(edit, now.state?.edits ?? []);
+    grade.show(edit);
+    mirror.show(edit);
     pane.refresh();
     filling = false;
     operations.replaceChildren(...edit.operations.map((text) => h("li", {}, text)));

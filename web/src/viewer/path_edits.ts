@@ -35,7 +35,8 @@ interface State {
   layers: PlacedLayer[];
 }
 
-const { BOX_ROWS, BOX_VECTOR, EDIT_ROWS, HEXAHEDRON, HEXAHEDRON_ROWS, Y_BOX_VECTOR } = EDIT_LAYOUT;
+const { BOX_ROWS, BOX_VECTOR, EDIT_ROWS, GRADE_SCALARS, HEXAHEDRON, HEXAHEDRON_ROWS, Y_BOX_VECTOR } =
+  EDIT_LAYOUT;
 
 /**
  * First rows of the boxes of an edit, whose union is taken between two states: its own, and those of its
@@ -113,11 +114,22 @@ export class PathEdits {
   }
 }
 
-/** Whether two states have the same kinds of edits: the fourth numbers of the rows state the kinds. */
+/**
+ * Whether two states have the same kinds of edits: the fourth numbers of the rows state the kinds, but for those of
+ * grades, which are interpolated.
+ */
 function haveSameKinds(one: State, other: State): boolean {
   if (one.edits !== other.edits || one.boxes !== other.boxes) return false;
-  for (let n = 3; n < one.rows.length; n += 4) if (one.rows[n] !== other.rows[n]) return false;
+  for (let n = 0; 4 * n < one.rows.length; n++) {
+    const differs = one.rows[4 * n + 3] !== other.rows[4 * n + 3];
+    if (differs && !(n < one.edits * EDIT_ROWS && isGradeRow(n % EDIT_ROWS))) return false;
+  }
   return true;
+}
+
+/** Whether the fourth number of a row of an edit is one of its grade. */
+function isGradeRow(row: number): boolean {
+  return row >= GRADE_SCALARS && row !== HEXAHEDRON + HEXAHEDRON_ROWS;
 }
 
 /** Rows between those of two states; boxes contain the boxes of both. */

@@ -14,7 +14,6 @@ from scipy import ndimage
 
 from cagefield.completion.surfaces.grid_block import GridBlock, interpolate_field
 from cagefield.fields.sh_rotation import rotate_sh_each
-from cagefield.geometry.cage import Cage
 from cagefield.typing import Mask
 from cagefield.warps.hexahedron_map import HexahedronMap
 
@@ -26,22 +25,22 @@ MIN_OWN_COLOR_SHARE = 0.05
 
 
 def feather_rim(
-    part: GridBlock, destination: GridBlock, inner: Cage, deformed: Cage, inside: Mask, width: float
+    part: GridBlock, destination: GridBlock, onto: HexahedronMap, inside: Mask, width: float
 ) -> GridBlock:
     """Block of a part whose rim fades into the block of its destination.
 
-    inside [X,Y,Z]: mask of V^c; destination: the deformed space without the part; width: of the rim,
-    voxels. A vertex whose destination is outside that block stays.
+    onto: map of V^c onto V; inside [X,Y,Z]: mask of V^c; destination: the deformed space without the part;
+    width: of the rim, voxels. A vertex whose destination is outside that block stays.
     """
     depth = ndimage.distance_transform_edt(inside)
     own_share = np.clip((depth - 0.5) / width, 0.0, 1.0)
     rim = ndimage.binary_dilation(inside, iterations=RIM_MARGIN_VERTICES) & (own_share < 1.0)
-    affine = HexahedronMap(deformed, inner).affine
+    affine = onto.affine
     if affine is None:
         rim &= inside
     points = part.positions(rim)
     if affine is None:
-        is_mapped, moved, jacobian = HexahedronMap(deformed, inner)(points)
+        is_mapped, moved, jacobian = onto(points)
         rim[tuple(np.argwhere(rim)[~is_mapped].T)] = False
     else:
         A, b = affine

@@ -91,6 +91,11 @@ class KnownSplats:
         check_cancelled()
         still = np.flatnonzero(~moved.left)
         gains = np.ones((len(moved.source), 3)) if moved.gains is None else moved.gains
+        if moved.grade is not None:
+            # A grade as factors of each splat's mean color.
+            mean = np.maximum(0.5 + C0 * field.sh[moved.source, 0], MIN_DIVISOR_COLOR)
+            graded = np.einsum("nij,nj->ni", moved.grade.colors, gains * mean)
+            gains = np.maximum(graded, 0.0) / mean
         return cls(
             splats,
             grid,

@@ -38,7 +38,7 @@ def composite_paste(
     if pasted.part is None or pasted.place is None:
         raise edit.unread()
     block = _layer_block(pasted.part)
-    onto = HexahedronMap(edit.deformed, pasted.place)
+    onto = edit.map_between(pasted.place, edit.deformed).inverse
     stored = ndimage.maximum_filter(_stored_mask(field), 3)
     parts = []
     for begin in range(0, block.density.size, VERTICES_PER_BATCH):

@@ -15,6 +15,8 @@ from scipy import ndimage
 
 from cagefield.compute.cancellation import check_cancelled
 from cagefield.edits import EditMap
+from cagefield.edits.grade import grade_sh
+from cagefield.edits.mapped_samples import SampleGrade
 from cagefield.fields.contraction import uncontract
 from cagefield.fields.sh import C0, scale_sh_colors
 from cagefield.fields.sh_rotation import rotate_sh_each
@@ -310,9 +312,13 @@ def _sample_changed(
     rows, points = rows[in_boxes], points[in_boxes]
     mapped = below.to_canonical(points)
     is_changed = (mapped.points != points).any(axis=1) | (mapped.layer != 0)
+    if mapped.grade is not None:
+        is_changed |= (mapped.grade.colors != np.eye(3)).any(axis=(1, 2)) | (mapped.grade.density != 1.0)
     sources = (block.field, *below.layers)
     jacobian = mapped.jacobian[is_changed]
     raw, sh = _sample_layers(sources, mapped.layer[is_changed], mapped.points[is_changed], jacobian)
+    if mapped.grade is not None:
+        raw, sh = _graded(raw, sh, mapped.grade.take(is_changed))
     return rows[is_changed], raw * _mean_stretch(jacobian) if preserve_opacity else raw, sh
 
 
@@ -332,7 +338,14 @@ def sample_edited_field(
     mapped = below.to_canonical(points)
     jacobian = mapped.jacobian if turn is None else mapped.jacobian @ np.linalg.inv(turn)
     raw, sh = _sample_layers((field, *below.layers), mapped.layer, mapped.points, jacobian)
+    if mapped.grade is not None:
+        raw, sh = _graded(raw, sh, mapped.grade)
     return raw * _mean_stretch(jacobian) if preserve_opacity else raw, sh
+
+
+def _graded(raw: Float32, sh: Float32, grade: SampleGrade) -> tuple[Float32, Float32]:
+    """Density [N] and harmonics [N,K,3] after the grades of edits."""
+    return raw * grade.density.astype(np.float32), grade_sh(sh, grade.colors)
 
 
 def _sample_layers(

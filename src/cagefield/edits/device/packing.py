@@ -14,6 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.edits.grade import Grade
+from cagefield.edits.grade_falloff import GradeFalloff
 from cagefield.errors import EditError
 from cagefield.geometry import hexahedron
 from cagefield.typing import Array
@@ -41,7 +43,13 @@ PART_PLACE = (
 RECORDS = 34
 EMPTY_PLACE = -1.0  # a place without density
 AFFINE, MATRIX, CENTER, LOW, HIGH, BEND, IMAGE, RECORD = 0, 1, 10, 13, 16, 19, 31, 55
-WIDTH = RECORDS + 8 * RECORD
+GRADED = RECORDS + 8 * RECORD  # 1 where the edit grades colors, see `edits.grade`
+GRADE_MATRIX = GRADED + 1  # M [3,3]
+GRADE_DENSITY = GRADED + 10  # factor of density at weight 1
+GRADE_INNER = GRADED + 11  # frame [4,3] of the inner cage of a `GradeFalloff`, of a continuous edit
+GRADE_OUTER = GRADED + 23  # frame [4,3] of the outer cage
+STILL = GRADED + 35  # 1 where the map is the identity: an edit that grades and moves nothing
+WIDTH = GRADED + 36
 
 EDGE = 1e-6
 """A sample counts as inside a hexahedron when its xi is within this of [-1,1]^3: rounding in float32."""
@@ -73,7 +81,7 @@ def _pack_discrete(row: NDArray[np.float32], warp: DiscreteWarp) -> None:
     row[FIRST], row[LAST] = int(warp.inner is None), 1 if warp.region is None else 2
     row[UNDER_PLACE] = EMPTY_PLACE
     if warp.inner is not None:
-        _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
+        _record(row, 0, warp.inner.deformed.corners, warp.inner.onto)
     _record(row, 1, (warp.region or warp.source).corners)
 
 
@@ -99,6 +107,18 @@ def _pack_continuous(row: NDArray[np.float32], warp: ContinuousWarp, lattice: in
         row[SIMPLE] = is_straight and warp.outer.is_affine
     elif isinstance(warp.shell, FlowShell):
         row[RESOLUTION] = FLOW
+
+
+def pack_grade(row: NDArray[np.float32], grade: Grade, falloff: GradeFalloff | None) -> None:
+    """Write the grade of an edit into its row, with the falloff of a continuous one."""
+    if grade.is_neutral:
+        return
+    row[GRADED] = 1.0
+    row[GRADE_MATRIX : GRADE_MATRIX + 9] = grade.matrix.ravel()
+    row[GRADE_DENSITY] = grade.opacity
+    if falloff is not None:
+        row[GRADE_INNER : GRADE_INNER + 12] = falloff.inner.ravel()
+        row[GRADE_OUTER : GRADE_OUTER + 12] = falloff.outer.ravel()
 
 
 def _record(row: NDArray[np.float32], number: int, corners: Array, onto: Array | None = None) -> None:

@@ -17,6 +17,7 @@ from cagefield.compute import devices
 from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.quadrants import take_tensors
 from cagefield.edits import Continuous, Edit, EditMap
+from cagefield.edits.device.kernels.device_stack import grade_samples
 from cagefield.edits.device.kernels.edit_maps import EditArgs
 from cagefield.edits.device_stack import DeviceStack
 from cagefield.rendering.nerf.kernels.torch_edit_map import map_tensors
@@ -44,6 +45,7 @@ class TensorMap:
         self.preserve_opacity = preserve_opacity
         self.is_reference = any(_has_no_kernel(step.edit) for step in edits.steps)
         self._stack = edits
+        self._is_graded = edits.is_graded
         self._layers = tuple(zip(edits.layers, edits.places, strict=True))
         if self.is_reference:
             return
@@ -66,6 +68,7 @@ class TensorMap:
         self, points: Any, viewdirs: Any, field: Callable[[Any, Any], tuple[Any, Any]]
     ) -> tuple[Any, Any]:
         """(sigma [N], rgb [N,3]) of a canonical field at deformed samples [N,3]; of layers in patches."""
+        deformed = points
         points, viewdirs, gain, places = self._mapped(points, viewdirs, self.preserve_opacity)
         sigma, rgb = field(points, viewdirs)
         for layer, place in self._layers:
@@ -74,7 +77,28 @@ class TensorMap:
                 at, along = (values[rows].cpu().numpy() for values in (points, viewdirs))
                 own = [torch.from_numpy(values).to(self.device) for values in layer(at, along)]
                 sigma, rgb = sigma.index_copy(0, rows, own[0]), rgb.index_copy(0, rows, own[1])
+        if self._is_graded:
+            colors, density = self._grade(deformed)
+            gain = gain * density
+            rgb = torch.einsum("nij,nj->ni", colors, rgb).clamp(0.0, 1.0)
         return sigma * gain, rgb
+
+    def _grade(self, points: Any) -> tuple[Any, Any]:
+        """(matrices [N,3,3] of rgb, factors [N] of density) at deformed points [N,3]."""
+        if self.is_reference:
+            grade = self._stack.to_canonical(points.detach().cpu().numpy().astype(np.float64)).grade
+            assert grade is not None
+            return tuple(
+                torch.from_numpy(values.astype(np.float32)).to(self.device)
+                for values in (grade.colors, grade.density)
+            )
+        devices.start()
+        samples = points.contiguous()
+        out = torch.empty((len(samples), 10), dtype=torch.float32, device=self.device)
+        if len(samples):
+            table, result = [values.numpy() if self._as_arrays else values for values in (samples, out)]
+            grade_samples(table, block_cyclic_schedule(len(samples)), result, self._edits, self.flows)
+        return out[:, :9].reshape(-1, 3, 3), out[:, 9]
 
     def jacobian(self, points: Any) -> Any:
         """The map's Jacobian [N,3,3] at deformed points [N,3]; 0 where a sample is emptied."""

@@ -96,7 +96,7 @@ def _baked(field: SplatField, moved: MovedSplats, preserve_opacity: bool) -> tup
     turned, scales, _ = np.linalg.svd(moved.jacobian @ axes)
     turned[np.linalg.det(turned) < 0.0, :, 2] *= -1.0
     sh = moved.sh(field.sh)
-    opacities = field.opacities[source].astype(np.float64)
+    opacities = moved.opacities(field.opacities)
     if not preserve_opacity:
         growth = np.cbrt(np.abs(np.linalg.det(moved.jacobian)))
         opacities = 1.0 - (1.0 - opacities) ** growth

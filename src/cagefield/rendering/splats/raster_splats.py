@@ -25,11 +25,11 @@ from numpy.typing import NDArray
 
 from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.edits import EditMap
-from cagefield.fields.sh import scale_sh_colors
+from cagefield.edits.mapped_samples import SampleGrade
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.rendering.splats.kernels.splat_args import SplatArgs
-from cagefield.rendering.splats.splat_motion import MovedSplats, moved_splats
+from cagefield.rendering.splats.splat_motion import MovedSplats, changed_sh, moved_splats
 from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.typing import Array, Float32, Mask
 
@@ -174,9 +174,9 @@ def _carried(
     growth = np.empty(count)
     deform(moved.source, moved.jacobian, field.quaternions, field.log_scales, covariances, rotations, growth)
     own = None
-    if not preserve_opacity:
-        before = field.opacities[moved.source].astype(np.float64)
-        own = (1.0 - (1.0 - before) ** growth).astype(np.float32)
+    if not preserve_opacity or moved.grade is not None:
+        before = moved.opacities(field.opacities)
+        own = (before if preserve_opacity else 1.0 - (1.0 - before) ** growth).astype(np.float32)
     return moved.points.astype(np.float32), covariances, own, rotations
 
 
@@ -191,6 +191,7 @@ class ChangedSplats:
         sources: [M] int64, splats of the field that have the harmonics of the new ones.
         splats: the M new ones; their `sh` are those of their sources, times `gains`.
         gains: [M,3], factors of their sources' red, green and blue; None where all are 1.
+        colors: [M,3,3], matrices of their sources' colors after the gains; None where no edit grades.
         rows: [M] int64, their originals: splats of the field, and, from N on, children of the split.
         jacobian: [M,3,3], d(deformed)/d(canonical) at their means.
     """
@@ -201,6 +202,7 @@ class ChangedSplats:
     rows: NDArray[np.int64]
     jacobian: Array
     gains: Float32 | None = None
+    colors: Float32 | None = None
 
 
 def changed_splats(
@@ -221,6 +223,7 @@ def changed_splats(
     means, covariances, own, rotations = _carried(field, moved, preserve_opacity)
     opacities = field.opacities[moved.source] if own is None else own
     sources, made_of, jacobian, gains = moved.source, moved.source, moved.jacobian, moved.gains
+    grade = moved.grade
     if split is not None:
         others = moved_splats(split.children, edits, coarse=coarse, proceed=proceed)
         more = _deformed(split.children.field, others, preserve_opacity, None)
@@ -242,14 +245,23 @@ def changed_splats(
         if gains is not None or others.gains is not None:
             own_gains = np.concatenate([np.ones((len(resting), 3)), _gains_of(others)])[in_order]
             gains = np.concatenate([_gains_of(moved), own_gains])
-    sh = field.sh[sources] if gains is None else scale_sh_colors(field.sh[sources], gains)
+        if grade is not None or others.grade is not None:
+            resting_grade = SampleGrade.neutral(len(resting))
+            own_grade = SampleGrade.concatenate([resting_grade, _grade_of(others)]).take(in_order)
+            grade = SampleGrade.concatenate([_grade_of(moved), own_grade])
+    sh = changed_sh(field.sh[sources], gains, grade)
     new = DeformedSplats(means, covariances, opacities, sh, rotations, field.antialiased)
     told = None if gains is None else gains.astype(np.float32)
-    return ChangedSplats(moved.left, sources, new, made_of, jacobian, told)
+    colors = None if grade is None else grade.colors.astype(np.float32)
+    return ChangedSplats(moved.left, sources, new, made_of, jacobian, told, colors)
 
 
 def _gains_of(moved: MovedSplats) -> Array:
     return np.ones((len(moved.source), 3)) if moved.gains is None else moved.gains
+
+
+def _grade_of(moved: MovedSplats) -> SampleGrade:
+    return moved.grade or SampleGrade.neutral(len(moved.source))
 
 
 _NO_TURN = np.eye(3, dtype=np.float32)

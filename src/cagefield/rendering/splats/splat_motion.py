@@ -16,13 +16,15 @@ Each edit of a stack takes the splats of the edits before it, originals and copi
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.compute.weak_memo import memoized_weakly
-from cagefield.edits import Edit, EditMap, Paste, PreparedEdit
+from cagefield.edits import Discrete, Edit, EditMap, Paste, PreparedEdit
+from cagefield.edits.grade import grade_sh, thinned_opacities
+from cagefield.edits.mapped_samples import SampleGrade
 from cagefield.edits.patch import SplatPatch
 from cagefield.fields.sh import scale_sh_colors
 from cagefield.fields.splat_field import SplatField
@@ -30,7 +32,6 @@ from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.typing import Array, Mask
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.forward import to_deformed
-from cagefield.warps.hexahedron_map import HexahedronMap
 
 MIN_LOG_GAIN = 0.01
 """The log of a change of light that is left out."""
@@ -52,6 +53,8 @@ class MovedSplats:
         points: [M,3], their means in deformed space.
         jacobian: [M,3,3], d(deformed)/d(canonical) there.
         gains: [M,3], factors of their red, green and blue; None where all are 1.
+        grade: matrices [M,3,3] of their colors after the gains, and factors [M] of their optical depth; None
+            where no edit grades.
     """
 
     left: Mask
@@ -59,12 +62,18 @@ class MovedSplats:
     points: Array
     jacobian: Array
     gains: Array | None = None
+    grade: SampleGrade | None = None
 
     def sh(self, harmonics: NDArray[np.float32]) -> NDArray[np.float32] | None:
         """The harmonics [M,K,3] of those shown elsewhere, from the field's [N,K,3]; None for its own."""
-        if self.gains is None:
+        if self.gains is None and self.grade is None:
             return None
-        return scale_sh_colors(harmonics[self.source], self.gains)
+        return changed_sh(harmonics[self.source], self.gains, self.grade)
+
+    def opacities(self, own: NDArray[np.float32]) -> Array:
+        """Opacities [M] of those shown elsewhere, from the field's [N]; a grade is part of them."""
+        values = own[self.source].astype(np.float64)
+        return values if self.grade is None else thinned_opacities(values, self.grade.density)
 
     @classmethod
     def at_rest(cls, splats: SplatSet) -> MovedSplats:
@@ -87,8 +96,13 @@ class MovedSplats:
     def without(self, gone: Mask) -> MovedSplats:
         """Moved splats without those that are True in `gone` [N]."""
         kept = ~gone[self.source]
-        gains = None if self.gains is None else self.gains[kept]
-        return MovedSplats(self.left | gone, self.source[kept], self.points[kept], self.jacobian[kept], gains)
+        return replace(self.take(kept), left=self.left | gone)
+
+    def take(self, rows: Mask) -> MovedSplats:
+        """Moved splats of some rows [M] of those shown elsewhere."""
+        gains = None if self.gains is None else self.gains[rows]
+        grade = None if self.grade is None else self.grade.take(rows)
+        return MovedSplats(self.left, self.source[rows], self.points[rows], self.jacobian[rows], gains, grade)
 
     def then(
         self, step: PreparedEdit, splats: SplatSet, coarse: bool, proceed: Callable[[], None] | None
@@ -103,18 +117,26 @@ class MovedSplats:
 
     def _with(self, step: PreparedEdit, splats: SplatSet) -> tuple[MovedSplats, Array]:
         """(these and the pasted splats of an edit, source positions [C,3] of those last rows)."""
+        assert isinstance(step.edit, Paste)
         rows = splats.pasted_rows(step)
         positions = splats.field.means[rows].astype(np.float64)
-        inside, points, jacobian = HexahedronMap(step.edit.deformed, step.edit.inner)(positions)
+        onto = step.edit.map_between(step.edit.inner, step.edit.deformed).inverse
+        inside, points, jacobian = onto(positions)
         gains = None
         if self.gains is not None:
             gains = np.concatenate([self.gains, np.ones((len(points), 3))])
+        grade = self.grade
+        if grade is not None or step.edit.is_graded:
+            before = self.grade or SampleGrade.neutral(len(self.source))
+            pasted = SampleGrade.neutral(len(points)).then(step.edit.grading, np.ones(len(points)))
+            grade = SampleGrade.concatenate([before, pasted])
         return MovedSplats(
             self.left,
             np.concatenate([self.source, rows[inside]]),
             np.concatenate([self.points, points]),
             np.concatenate([self.jacobian, jacobian]),
             gains,
+            grade,
         ), positions[inside]
 
     def _moved(
@@ -134,6 +156,11 @@ class MovedSplats:
         mapped = to_deformed(warp, points, coarse=coarse, proceed=proceed)
         moves = np.empty(len(points), bool)
         changes(points, mapped.points, mapped.jacobian, moves)
+        weights = None
+        if step.edit.is_graded and not isinstance(step.edit, Paste):
+            inside = step.edit.inner.contains(points) if isinstance(step.edit, Discrete) else moves
+            weights = step.edit.grade_weights(points, inside)
+            moves |= weights > 0.0
         leaves = moves | mapped.lost
         if isinstance(warp, DiscreteWarp) and warp.keep_source and warp.inner is not None:
             leaves &= mapped.lost | warp.inner.deformed.contains(points)
@@ -151,12 +178,20 @@ class MovedSplats:
         if self.gains is not None:
             before = np.concatenate([np.ones((len(still), 3)), self.gains[near]])
             gains = np.concatenate([self.gains[stays], before[come]])
+        grade = None
+        if self.grade is not None or weights is not None:
+            known = self.grade or SampleGrade.neutral(len(self.source))
+            arrived = SampleGrade.concatenate([SampleGrade.neutral(len(still)), known.take(near)]).take(come)
+            if weights is not None:
+                arrived = arrived.then(step.edit.grading, weights[come])
+            grade = SampleGrade.concatenate([known.take(stays), arrived])
         moved = MovedSplats(
             left,
             np.concatenate([self.source[stays], np.concatenate([still, self.source[near]])[come]]),
             np.concatenate([self.points[stays], mapped.points[come]]),
             np.concatenate([self.jacobian[stays], jacobian]),
             gains,
+            grade,
         )
         return moved, points[come]
 
@@ -191,7 +226,21 @@ class MovedSplats:
         ]
         if patch.field is splats.scene:
             parts.append((patch.sources, patch.points, patch.jacobian, patch.gains))
-        return MovedSplats(left, *(np.concatenate(column) for column in zip(*parts, strict=True)))
+        source, points, jacobian, gains = (np.concatenate(column) for column in zip(*parts, strict=True))
+        grade = None
+        if self.grade is not None:
+            known = self.grade.take(kept)
+            fresh = SampleGrade.neutral(len(source) - len(known.density))
+            grade = SampleGrade.concatenate([known, fresh])
+        return MovedSplats(left, source, points, jacobian, gains, grade)
+
+
+def changed_sh(
+    sh: NDArray[np.float32], gains: Array | None, grade: SampleGrade | None
+) -> NDArray[np.float32]:
+    """Harmonics [M,K,3] times gains [M,3], and then by the matrices of a grade."""
+    lit = sh if gains is None else scale_sh_colors(sh, gains)
+    return lit if grade is None else grade_sh(lit, grade.colors)
 
 
 @dataclass(frozen=True)

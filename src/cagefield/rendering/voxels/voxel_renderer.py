@@ -162,6 +162,8 @@ class VoxelRenderer:
         edited = march.UNEDITED if self._stack.n_edits == 0 else march.EDITED
         if self._stack.has_flows:
             edited = march.EDITED_BY_FLOWS
+        if self._stack.is_graded:
+            edited += march.GRADED - march.EDITED
         rows = down if proceed is None else BAND
         for row in range(0, down, rows):
             if proceed is not None:

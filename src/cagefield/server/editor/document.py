@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.chains import application_order
+from cagefield.edits.grade import NEUTRAL_GRADE, Grade
 from cagefield.edits.operations import Operation
 from cagefield.edits.shells import SMOOTH_FLOW, Flow
 from cagefield.errors import EditError
@@ -23,6 +24,7 @@ class Spare:
 
     operations: tuple[Operation, ...] = ()
     flow: Flow = SMOOTH_FLOW
+    grading: Grade = NEUTRAL_GRADE
 
 
 @dataclass(frozen=True)

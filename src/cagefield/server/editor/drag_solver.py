@@ -84,7 +84,7 @@ def _sum(first: Operation, second: Operation) -> Operation | None:
     """
     if isinstance(first, ops.MovePoints) and first.radius > 0.0:
         return None
-    turning = ops.Rotate | ops.Scale | ops.Shear | ops.Bend | ops.Twist | ops.Taper
+    turning = ops.Rotate | ops.Scale | ops.Shear | ops.Bend | ops.Twist | ops.Taper | ops.Mirror
     if isinstance(first, turning) or isinstance(second, turning) or type(first) is not type(second):
         return None
     x, y, z = (a + b for a, b in zip(first.by, second.by, strict=True))

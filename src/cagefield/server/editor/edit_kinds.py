@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
-from cagefield.edits import Continuous, Copy, Delete, Edit, Flow, Move, Paste, shell_kind
+from cagefield.edits import Continuous, Copy, Delete, Edit, Flow, Grade, Move, Paste, shell_kind
 from cagefield.edits.shells import SMOOTH_FLOW, problem_of_unused_falloff
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
@@ -36,7 +36,8 @@ def with_kind(entry: Entry, kind: Kind) -> Entry:
     if isinstance(edit, Paste):
         raise EditError(f'edit "{edit.name}" is pasted, and stays a copy; remove it to take it away')
     settings, flow = edit.shell_settings, _flow(edit)
-    spare = Spare(edit.operations or entry.spare.operations, flow or entry.spare.flow)
+    grading = entry.spare.grading if isinstance(edit, Delete) else edit.grading
+    spare = Spare(edit.operations or entry.spare.operations, flow or entry.spare.flow, grading)
     shared = edit.shared_options
     if kind == "continuous":
         outer = outer_cage_around(edit, _margin(edit)) if settings.outer is None else settings.outer
@@ -48,6 +49,7 @@ def with_kind(entry: Entry, kind: Kind) -> Entry:
             shell=shell,
             lattice=settings.lattice,
             allow_folding=settings.allow_folding,
+            grading=grading,
             **shared,
         )
     else:
@@ -56,7 +58,9 @@ def with_kind(entry: Entry, kind: Kind) -> Entry:
             changed = Delete(edit.inner, unused_shell=unused, **shared)
         else:
             discrete = Copy if kind == "copy" else Move
-            changed = discrete(edit.inner, operations=spare.operations, unused_shell=unused, **shared)
+            changed = discrete(
+                edit.inner, operations=spare.operations, unused_shell=unused, grading=grading, **shared
+            )
     return replace(entry, edit=changed, spare=spare)
 
 
@@ -76,11 +80,13 @@ def with_outer(edit: Edit, outer: Cage) -> Edit:
 
 
 def with_options(edit: Edit, options: Mapping[str, Any]) -> Edit:
-    """The edit with options that a page names changed: falloff, width, lattice, allow_folding, or fields.
+    """The edit with options that a page names changed: falloff, width, lattice, allow_folding, grade, fields.
 
     Raises `EditError` for a falloff or a width of an edit without a flow shell.
     """
     fields, settings = dict(options), edit.shell_settings
+    if "grade" in fields:
+        fields["grading"] = Grade(**fields.pop("grade"))
     falloff = {name: fields.pop(name) for name in ("falloff", "width") if name in fields}
     shell = {name: fields.pop(name) for name in ("lattice", "allow_folding") if name in fields}
     if falloff:

@@ -8,7 +8,7 @@ from cagefield.server.editor.document import Document, Entry
 from cagefield.server.editor.drag_solver import Target
 
 _TARGETS: dict[Target, str] = {"field": "", "inner": " inner cage", "outer": " outer cage", "both": " cages"}
-_OPTIONS = {"relight": "shadows"}
+_OPTIONS = {"relight": "shadows", "grade": "color"}
 _WORDS = {"translation": "Move", "rotation": "Rotate", "scaling": "Scale", "shear": "Shear"}
 
 

@@ -39,7 +39,7 @@ def mirrored_operation(operation: Operation, axis: int, cage: Cage) -> Operation
         R = Rotation.from_euler("XYZ", operation.degrees, degrees=True).as_matrix()
         x, y, z = ops.euler_degrees(Rotation.from_matrix(F @ R @ F)).tolist()
         return ops.Rotate((x, y, z), operation.axes)
-    if isinstance(operation, ops.Scale):
+    if isinstance(operation, ops.Scale | ops.Mirror):
         return operation
     if isinstance(operation, ops.Shear):
         name = "xyz"[axis]

@@ -10,11 +10,11 @@ from cagefield.edits.paste_placement import placed_paste
 from cagefield.errors import CageError, EditError
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
-from cagefield.warps.hexahedron_map import HexahedronMap
 
 PASTE_VIEW_SHARE = 0.5
 """Longest edge of pasted content, as a share of the view's height at the surface below it."""
 
+MIRRORED = "the paste is mirrored about the middle of its cage; crop it first, and mirror it then"
 BENT = "what is pasted was bent; take the moves of its corners back, then set its cage"
 TURNED = "the cage of a paste shrinks, grows and moves in Set mode; turn it in Edit mode (Tab)"
 
@@ -37,7 +37,9 @@ def crop_paste(edit: Paste, cage: Cage) -> Paste:
 
     Raises EditError where its operations do not allow that.
     """
-    phi = HexahedronMap(edit.inner, edit.deformed).affine
+    if edit.mirrored:
+        raise EditError(MIRRORED)
+    phi = edit.map_between(edit.inner, edit.deformed).affine
     if phi is None:
         raise EditError(BENT)
     A, b = phi

@@ -18,6 +18,7 @@ from cagefield.server.protocol.common import (
     EditId,
     FalloffName,
     FillName,
+    GradeValues,
     JobKind,
     Key,
     Message,
@@ -195,6 +196,7 @@ class Change(Message):
     parent: Annotated[int, Field(ge=0)] | None = Field(
         default=None, description="the edit that carries this one; 0: none"
     )
+    grade: GradeValues | None = None
 
 
 class SceneChange(Message):

@@ -21,9 +21,11 @@ pages are told with `preview` that it began, and that it is over, also where som
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+from cagefield.edits.grade import RANGES
 
 Vec3: TypeAlias = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 Corners: TypeAlias = tuple[Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3]
@@ -85,6 +87,22 @@ class CameraMessage(Message):
 
     def redundancy_key(self) -> str:
         return self.type
+
+
+def _in_range(name: str) -> Any:
+    low, high = RANGES[name]
+    return Field(ge=low, le=high)
+
+
+class GradeValues(Message):
+    """All values of an edit's `Grade`."""
+
+    exposure: Annotated[float, _in_range("exposure")]
+    temperature: Annotated[float, _in_range("temperature")]
+    tint: Annotated[float, _in_range("tint")]
+    saturation: Annotated[float, _in_range("saturation")]
+    hue_deg: Annotated[float, _in_range("hue_deg")]
+    opacity: Annotated[float, _in_range("opacity")]
 
 
 class Key(Message):

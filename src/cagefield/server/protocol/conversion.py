@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -54,6 +55,8 @@ def operation_of(message: operation_messages.OperationMessage) -> Operation:
         return ops.Bend(message.axis, message.degrees, message.towards, message.fixed)
     if isinstance(message, operation_messages.TwistBy):
         return ops.Twist(message.axis, message.degrees, message.fixed)
+    if isinstance(message, operation_messages.MirrorBy):
+        return ops.Mirror(message.axis)
     return ops.Taper(message.axis, message.factor, message.fixed)
 
 
@@ -168,6 +171,7 @@ def edit_state(
         inner_pivot=vec3(cage_in_scene(edit).pivot),
         outer_pivot=None if settings.outer is None else vec3(settings.outer.pivot),
         operations=[f"{operation.noun} {operation}" for operation in edit.operations],
+        grade=common.GradeValues(**asdict(edit.grading)),
         parent=parent,
         carrier=None if carrier is None else cast(Any, tuple(carrier.reshape(-1).tolist())),
         problem=problem,

@@ -107,6 +107,13 @@ class TaperBy(Message):
     fixed: FixedEnd = "start"
 
 
+class MirrorBy(Message):
+    """Reflect the content of a move, a copy or a paste along an axis of its cage."""
+
+    kind: Literal["mirror"] = "mirror"
+    axis: AxisName
+
+
 OperationMessage: TypeAlias = Annotated[
     TranslateBy
     | RotateBy
@@ -117,6 +124,7 @@ OperationMessage: TypeAlias = Annotated[
     | MovePointsBy
     | BendBy
     | TwistBy
-    | TaperBy,
+    | TaperBy
+    | MirrorBy,
     Field(discriminator="kind"),
 ]

@@ -15,6 +15,7 @@ from cagefield.server.protocol.common import (
     EditId,
     FalloffName,
     FillName,
+    GradeValues,
     InterpolationName,
     JobKind,
     Key,
@@ -99,6 +100,7 @@ class EditState(Message):
     inner_pivot: Vec3
     outer_pivot: Vec3 | None
     operations: list[str]
+    grade: GradeValues
     parent: EditId | None
     """The edit that carries this one."""
     carrier: Affine | None

@@ -26,6 +26,7 @@ from cagefield.edits.device.packing import (
     RECORDS,
     RESOLUTION,
     SIMPLE,
+    STILL,
     UNDER_PLACE,
 )
 from cagefield.warps.kernels.flow_shell import flow_sample
@@ -77,7 +78,9 @@ def map_edit(
     hit = -1
     best = 1e30
     at = vec3(0.0, 0.0, 0.0)
-    if params[e, SIMPLE] > 0.5:
+    if params[e, STILL] > 0.5:
+        hit = -1
+    elif params[e, SIMPLE] > 0.5:
         y = times(params, e, RECORDS + MATRIX, p - read3(params, e, RECORDS + CENTER))
         if first == 0 and qd.abs(y).max() <= 1.0 + EDGE:
             hit = 0

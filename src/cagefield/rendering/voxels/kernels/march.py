@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from cagefield.compute.block_cyclic import Schedule, scheduled_item, turn_count
 from cagefield.compute.quadrants import qd
 from cagefield.edits.device.kernels.edit_maps import EditArgs, map_sample
+from cagefield.edits.device.kernels.grade import grade_sample
 from cagefield.rendering.voxels.kernels.edited_ray import (
     BENT,
     STAYED,
@@ -69,8 +70,9 @@ class TileArgs:
     rows: qd.i32
 
 
-UNEDITED, EDITED, EDITED_BY_FLOWS = range(3)
-"""Maps that a march evaluates: none, those of edits from lattices or closed forms, flows too."""
+UNEDITED, EDITED, EDITED_BY_FLOWS, GRADED, GRADED_BY_FLOWS = range(5)
+"""Work of a march for edits: none, maps from lattices or closed forms, flows too (even numbers), and
+grades of colors with them (from GRADED on)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +118,7 @@ def march_tiles(
     """Marches rows of tiles of a rectangle of a camera's picture.
 
     out: [size.y * size.x, 8]: premultiplied rgb, opacity, sum of w t, and the premultiplied normal, 0 without
-    `with_normals`. `edited`: UNEDITED, EDITED, or EDITED_BY_FLOWS where a flow is evaluated exactly.
+    `with_normals`. `edited`: UNEDITED to GRADED_BY_FLOWS.
 
     The part of a ray that may lie in the edits' boxes is found first; only its samples in occupied blocks
     evaluate the edits' maps.
@@ -187,9 +189,7 @@ def march_tiles(
                     if qd.static(edited != UNEDITED):
                         if t >= edit_in and t <= edit_out:
                             p = camera.origin + t * d
-                            canonical, view, place, moved = map_along(
-                                ray, t, p, d, edits, edited == EDITED_BY_FLOWS
-                            )
+                            canonical, view, place, moved = map_along(ray, t, p, d, edits, edited % 2 == 0)
                             if moved != STAYED:
                                 g = to_grid(canonical, grid, contracted)
                     # The last bricks reach beyond the grid, and an edit may map samples there.
@@ -210,6 +210,13 @@ def march_tiles(
                             if qd.static(edited != UNEDITED):
                                 if march.preserve_opacity == 1 and moved != STAYED:
                                     raw *= view.norm()
+                            colors = mat3(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+                            if qd.static(edited >= GRADED):
+                                if t >= edit_in and t <= edit_out:
+                                    colors, thickness = grade_sample(
+                                        camera.origin + t * d, edits, edited % 2 == 0
+                                    )
+                                    raw *= thickness
                             keep = qd.exp(-raw * h)
                             w = T * (1.0 - keep)
                             T *= keep
@@ -221,7 +228,10 @@ def march_tiles(
                                     elif moved == BENT:
                                         seen = sh_basis(view / qd.max(view.norm(), 1e-20), K)
                                 c = gather_rgb(grid.sh, slots, b, seen, K)
-                                rgb += w * qd.max(qd.min(c, 1.0), 0.0)
+                                c = qd.max(qd.min(c, 1.0), 0.0)
+                                if qd.static(edited >= GRADED):
+                                    c = qd.max(qd.min(colors @ c, 1.0), 0.0)
+                                rgb += w * c
                                 depth += w * t
                                 if qd.static(with_normals):
                                     slope = density_slope(grid.density, slots, f)
@@ -233,7 +243,7 @@ def march_tiles(
                                     if qd.static(edited != UNEDITED):
                                         if moved != STAYED:
                                             slope = through_edits(
-                                                slope, camera.origin + t * d, edits, edited == EDITED_BY_FLOWS
+                                                slope, camera.origin + t * d, edits, edited % 2 == 0
                                             )
                                     normal -= w * slope / qd.max(slope.norm(), 1e-12)
                     t += h
