@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Geometry nodes and materials that show splats: as points, or as ellipsoids for renders.
 
-Ellipsoids are `EXTENT` standard deviations large and have the opacity of a splat throughout: a preview, no image
-of splats.
+Ellipsoids are `EXTENT` standard deviations large and have the opacity of a splat throughout: a preview, not
+an image of splats.
 """
 
 import bpy
