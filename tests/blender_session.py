@@ -4,6 +4,7 @@ FOLDER has splats.ply. Each step writes what a test compares: arrays as .npz, an
 """
 
 # ruff: noqa: E402  bpy and the add-on are imported once the path is known
+import importlib
 import json
 import os
 import sys
@@ -13,11 +14,11 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "integrations"))
 
-import addon_utils
-import bpy
+import bpy  # which makes addon_utils importable
 import numpy as np
 from mathutils import Euler, Matrix, Vector
 
+addon_utils = importlib.import_module("addon_utils")
 MODULE = "blender"  # the add-on's folder
 TIMEOUT_S = 300.0
 

@@ -337,6 +337,7 @@ def with_nan(values: np.ndarray, row: int) -> np.ndarray:
 
 MOVE = deform_request(INNER, MOVED.corners)
 CONTINUOUS = deform_request(INNER, MOVED.corners, OUTER)
+LATTICE = lattice_request([2, 3, 4], "bspline")
 NO_TRIANGLES = np.zeros((0, 3), np.int32)
 INSIDE_OUT = INNER.corners[[1, 0, 3, 2, 5, 4, 7, 6]]
 
@@ -370,14 +371,14 @@ INSIDE_OUT = INNER.corners[[1, 0, 3, 2, 5, 4, 7, 6]]
         (changed(CONTINUOUS, inner_edges=CUBE_EDGES[:11], inner_triangles=NO_TRIANGLES), "0 triangles"),
         (changed(CONTINUOUS, outer_edges=CUBE_EDGES[:11]), "outer cage must be a cube of 8 vertices"),
         (changed(CONTINUOUS, inner_target=MOVED.corners + 5.0), "outer cage must contain the inner cage"),
-        (lattice_request([2, 3, 9], "bspline"), "2 to 8 control points"),
+        (changed(LATTICE, {"inner": {"type": "lattice", "shape": [2, 3, 9]}}), "2 to 8 control points"),
         (lattice_request([2, 3, 4], "cardinal"), "interpolation is one of bspline, linear, got 'cardinal'"),
         (
-            changed(lattice_request([2, 3, 4], "linear"), {"inner": {"type": "lattice", "shape": [2, 2, 2]}}),
+            changed(LATTICE, {"inner": {"type": "lattice", "shape": [2, 2, 2]}}),
             "lattice of 2 x 2 x 2 points, got 24",
         ),
         (
-            changed(lattice_request([2, 3, 4], "bspline"), {"inner": {"type": "lattice", "shape": [2.0]}}),
+            changed(LATTICE, {"inner": {"type": "lattice", "shape": [2.0]}}),
             "shape of a lattice is 3 whole numbers",
         ),
     ],

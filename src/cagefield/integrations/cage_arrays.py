@@ -23,6 +23,9 @@ from cagefield.typing import AnyArray, Array
 
 Role: TypeAlias = Literal["inner", "outer"]
 
+AT_ASSIGNMENT, NOW = "when it was assigned", "as it is now"
+"""Moments of a cage, in messages."""
+
 
 def hexahedron_order(vertices: AnyArray, edges: AnyArray) -> NDArray[np.intp] | None:
     """Vertex numbers [8] of corners 0 to 7, of a mesh with the edge graph of a cube; None for other meshes.
@@ -91,8 +94,8 @@ def mesh_cage(
         )
     order = hexahedron_order(before, edges)
     if order is not None:
-        cage = _valid(Cage, role, "when it was assigned", before[order])
-        _valid(Cage, role, "as it is now", after[order])
+        cage = _valid(Cage, role, AT_ASSIGNMENT, before[order])
+        _valid(Cage, role, NOW, after[order])
         return cage, after[order]
     if role == "outer":
         raise CageError(
@@ -101,8 +104,8 @@ def mesh_cage(
         )
     if _are_numbers_of(triangles, len(before)) and signed_volume(before, triangles) < 0.0:
         triangles = triangles[:, ::-1]
-    mesh = _valid(MeshCage, role, "when it was assigned", before, triangles)
-    _valid(MeshCage, role, "as it is now", after, triangles)
+    mesh = _valid(MeshCage, role, AT_ASSIGNMENT, before, triangles)
+    _valid(MeshCage, role, NOW, after, triangles)
     return mesh, after
 
 
@@ -134,8 +137,8 @@ def lattice_cage(
     directions = [(grid[:, :, -1] - grid[:, :, 0]), (grid[:, -1] - grid[:, 0]), (grid[-1] - grid[0])]
     if np.linalg.det(np.stack([side.mean(axis=(0, 1)) for side in directions])) < 0.0:
         before, after = (as_grid(points)[:, :, ::-1].reshape(-1, 3) for points in (before, after))
-    cage = _valid(LatticeCage, "inner", "when it was assigned", before, counts, interpolation)
-    _valid(LatticeCage, "inner", "as it is now", after, counts, interpolation)
+    cage = _valid(LatticeCage, "inner", AT_ASSIGNMENT, before, counts, interpolation)
+    _valid(LatticeCage, "inner", NOW, after, counts, interpolation)
     return cage, after
 
 
@@ -155,8 +158,10 @@ def _vertices(values: AnyArray, role: Role, moment: str) -> Array:
 
 
 def _valid(make: type[Cage], role: Role, moment: str, *arguments: object) -> Cage:
-    """A cage. Raises CageError with its role and moment where it is none."""
+    """A cage. Raises CageError with its role, the moment and a cure for the other program."""
     try:
         return make(*arguments)  # type: ignore[arg-type]
     except CageError as error:
-        raise CageError(f"{role} cage {moment}: {error}") from None
+        fault = str(error).partition(";")[0]
+        cure = "move its points back" if moment == NOW else "repair it, and assign it again"
+        raise CageError(f"{role} cage {moment}: {fault}; {cure}") from None

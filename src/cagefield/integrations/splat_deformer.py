@@ -33,7 +33,7 @@ from cagefield.errors import CageError, CagefieldError, EditError, FieldError
 from cagefield.exporting import edited_splats, upright
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import Cage
-from cagefield.integrations.cage_arrays import Role, lattice_cage, mesh_cage
+from cagefield.integrations.cage_arrays import NOW, Role, lattice_cage, mesh_cage
 from cagefield.integrations.frames import Frame
 from cagefield.scene.scene import Scene
 from cagefield.typing import AnyArray, Array
@@ -199,7 +199,7 @@ def edit_from_request(request: Frame) -> Edit:
         try:
             edit = edit.replace(operations=operations_to(inner, target))
         except CageError as error:
-            raise CageError(f"inner cage as it is now: {error}") from None
+            raise CageError(f"inner cage {NOW}: {error}") from None
     edit.check()
     return edit
 
