@@ -26,7 +26,7 @@ folder = Path(sys.argv[1])
 report: dict[str, object] = {"version": bpy.app.version_string}
 bpy.ops.wm.read_factory_settings(use_empty=True)
 assert addon_utils.enable(MODULE, default_set=True) is not None
-from blender import live, session, splat_objects
+from blender import live, session, splat_nodes, splat_objects
 
 addon = bpy.context.preferences.addons[MODULE]
 report["license"] = (ROOT / "integrations/blender/LICENSE").read_text().strip().splitlines()[0].strip()
@@ -174,6 +174,20 @@ report["a change is noticed"] = bpy.context.scene.name in live._changed
 live.tick()
 report["equal shapes sent"] = process._number - sent
 
+# ---- live: an animated cage ----
+before = inner.location.copy()
+inner.keyframe_insert("location", frame=1)
+inner.location.z += 0.05
+inner.keyframe_insert("location", frame=2)
+bpy.context.scene.frame_set(2)
+follow_until(lambda: process._number > sent and not process.is_busy)
+save("animated", settings().result)
+animated = session.edit_request(settings(), bpy.context.evaluated_depsgraph_get())[1]
+np.savez(folder / "animated_request.npz", **animated)
+inner.animation_data_clear()
+inner.location = before
+refresh()
+
 # ---- the process ends: one line, and the next update starts another ----
 process._process.kill()
 process._process.wait()
@@ -212,6 +226,10 @@ bpy.ops.cagefield.show_ellipsoids(shown=True)
 refresh()
 instances = [one for one in bpy.context.evaluated_depsgraph_get().object_instances if one.is_instance]
 report["ellipsoids"] = len(instances)
+bpy.ops.cagefield.make_cages()
+bpy.ops.cagefield.update()
+report["the result has ellipsoids"] = splat_nodes.shows_ellipsoids(settings().result)
+bpy.ops.cagefield.reset()
 bpy.ops.cagefield.show_ellipsoids(shown=False)
 
 # ---- the end: the process goes with the add-on ----

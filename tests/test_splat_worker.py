@@ -25,7 +25,7 @@ from cagefield.errors import CageError, CagefieldError, FieldError
 from cagefield.exporting import edited_splats
 from cagefield.integrations.cage_arrays import hexahedron_order
 from cagefield.integrations.frames import (
-    MAGIC,
+    FRAME_MAGIC,
     MAX_HEADER_BYTES,
     Frame,
     FrameError,
@@ -103,7 +103,7 @@ def test_a_frame_comes_back_bit_for_bit(direction: str) -> None:
     assert (addon.read_frame(stream) if direction == "to the add-on" else read_frame(stream)) is None
 
 
-def raw(header: bytes, content: bytes = b"", magic: bytes = MAGIC, length: int | None = None) -> bytes:
+def raw(header: bytes, content: bytes = b"", magic: bytes = FRAME_MAGIC, length: int | None = None) -> bytes:
     return struct.pack("<4sI", magic, len(header) if length is None else length) + header + content
 
 
@@ -321,7 +321,8 @@ def test_a_scene_is_opened_with_its_own_edits(tmp_path: Path) -> None:
     moved = deformer.reply(request)
     both = EditStack([first, edit_from_request(request)])
     np.testing.assert_array_equal(moved.arrays["means"], edited_splats(scene.with_edits(both)).means)
-    assert np.abs(moved.arrays["means"] - shown.means).max() > 0.9
+    high = moved.arrays["means"][moved.arrays["means"][:, 2] > 1.5]
+    assert len(high) > 10 and high[:, 0].min() > 0.5
 
 
 def changed(request: Frame, header: dict[str, Any] | None = None, **arrays: Any) -> Frame:
@@ -365,8 +366,8 @@ INSIDE_OUT = INNER.corners[[1, 0, 3, 2, 5, 4, 7, 6]]
         (changed(MOVE, inner_target=INNER.corners[:7]), "inner cage has 7 vertices, 8 when it was assigned"),
         (changed(MOVE, inner_target=with_nan(INNER.corners, 3)), "vertex 3 of the inner cage now must be"),
         (changed(MOVE, inner_rest=with_nan(INNER.corners, 3)), "vertex 3 of the inner cage at rest must be"),
-        (changed(MOVE, inner_target=INSIDE_OUT), "inner cage as it is now: .*(inside out|mirrored)"),
-        (changed(MOVE, inner_target=INNER.corners * (1, 1, 0)), "inner cage as it is now: .*flat"),
+        (changed(MOVE, inner_target=INSIDE_OUT), "inner cage as it is now: cage is mirrored.*; move"),
+        (changed(MOVE, inner_target=INNER.corners * (1, 1, 0)), "cage as it is now: .* zero size.*; move"),
         (changed(MOVE, inner_edges=CUBE_EDGES[:11]), "needs a cage with 8 corners"),
         (changed(CONTINUOUS, inner_edges=CUBE_EDGES[:11], inner_triangles=NO_TRIANGLES), "0 triangles"),
         (changed(CONTINUOUS, outer_edges=CUBE_EDGES[:11]), "outer cage must be a cube of 8 vertices"),
@@ -389,7 +390,7 @@ def test_impossible_requests_name_the_cure(request_: Frame, message: str) -> Non
         deformer.reply(request_)
     assert "\n" not in str(raised.value)
     # The splats are as they were.
-    assert deformer.reply(deform_request(INNER, INNER.corners, kind="delete")).header["count"] < 200
+    assert deformer.reply(deform_request(INNER, INNER.corners)).header["count"] == 200
 
 
 def test_splats_of_wrong_shapes_are_refused() -> None:

@@ -44,6 +44,13 @@ def _on_change(scene, depsgraph):
 
 
 @bpy.app.handlers.persistent
+def _on_frame(scene, depsgraph):
+    """Cages may be animated."""
+    if scene.cagefield.live:
+        _changed.add(scene.name)
+
+
+@bpy.app.handlers.persistent
 def _on_load(*_):
     """A file that is opened has nothing to do with the requests before it; its live scenes go on."""
     _changed.clear()
@@ -105,12 +112,14 @@ def _show(name, reply, splats):
 def register():
     """Adds the handlers."""
     bpy.app.handlers.depsgraph_update_post.append(_on_change)
+    bpy.app.handlers.frame_change_post.append(_on_frame)
     bpy.app.handlers.load_post.append(_on_load)
 
 
 def unregister():
     """Removes the handlers and the timer, and ends the worker."""
     bpy.app.handlers.depsgraph_update_post.remove(_on_change)
+    bpy.app.handlers.frame_change_post.remove(_on_frame)
     bpy.app.handlers.load_post.remove(_on_load)
     if bpy.app.timers.is_registered(_timer):
         bpy.app.timers.unregister(_timer)

@@ -7,7 +7,7 @@ import os
 import bpy
 import numpy as np
 
-from . import cages, splat_objects, worker
+from . import cages, splat_nodes, splat_objects, worker
 
 _current = None
 
@@ -116,6 +116,7 @@ def show_result(scene, arrays):
         collections = source.users_collection or (scene.collection,)
         result = splat_objects.new_splat_object(f"{source.name} deformed", arrays, collections[0])
         result.parent = source
+        splat_nodes.show_ellipsoids(result, splat_nodes.shows_ellipsoids(source))
         settings.result = result
     else:
         splat_objects.write_splats(result.data, arrays)

@@ -20,6 +20,12 @@ def show_as_splats(thing):
     modifier.node_group = bpy.data.node_groups.get(GROUP) or _group()
 
 
+def shows_ellipsoids(thing):
+    """True where an object's splats are shown as ellipsoids."""
+    modifier = thing.modifiers.get(MODIFIER)
+    return modifier is not None and bool(modifier[_identifier(modifier.node_group)])
+
+
 def show_ellipsoids(thing, shown):
     """Shows an object's splats as ellipsoids, or as points."""
     modifier = thing.modifiers.get(MODIFIER)
@@ -98,7 +104,8 @@ def _material(name, attribute_type):
     if material is not None:
         return material
     material = bpy.data.materials.new(name)
-    material.use_nodes = True
+    if material.node_tree is None:  # of Blender before 5.0
+        material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
     color = nodes.new("ShaderNodeAttribute")

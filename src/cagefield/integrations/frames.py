@@ -27,7 +27,7 @@ from cagefield.files import json_text
 from cagefield.files.memory import memory_shortage
 from cagefield.typing import AnyArray
 
-MAGIC = b"CGF1"
+FRAME_MAGIC = b"CGF1"
 PREFIX = struct.Struct("<4sI")
 MAX_HEADER_BYTES = 1 << 20
 MAX_ARRAYS = 32
@@ -64,7 +64,7 @@ def write_frame(stream: BinaryIO, frame: Frame) -> None:
             f"a frame has a header of at most {MAX_HEADER_BYTES} bytes and {MAX_ARRAYS} arrays, got"
             f" {len(text)} and {len(arrays)}"
         )
-    stream.write(PREFIX.pack(MAGIC, len(text)) + text)
+    stream.write(PREFIX.pack(FRAME_MAGIC, len(text)) + text)
     for values in arrays.values():
         stream.write(values.reshape(-1).view(np.uint8).data)
     stream.flush()
@@ -80,8 +80,10 @@ def read_frame(stream: BinaryIO) -> Frame | None:
     if prefix is None:
         return None
     magic, length = PREFIX.unpack(prefix)
-    if magic != MAGIC:
-        raise FrameError(f"a frame begins with {MAGIC!r}, got {magic!r}; use the same version on both sides")
+    if magic != FRAME_MAGIC:
+        raise FrameError(
+            f"a frame begins with {FRAME_MAGIC!r}, got {magic!r}; use the same version on both sides"
+        )
     if length > MAX_HEADER_BYTES:
         raise FrameError(f"a header has at most {MAX_HEADER_BYTES} bytes, got {length}")
     text = _read(stream, length, "header")
