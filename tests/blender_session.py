@@ -215,6 +215,26 @@ bpy.ops.cagefield.update()
 save("lattice", settings().result)
 bpy.ops.cagefield.save_edits(filepath=str(folder / "lattice.yaml"))
 
+# ---- a point cloud as the splats ----
+cloud = imported.copy()
+cloud.data = imported.data.copy()
+bpy.context.collection.objects.link(cloud)
+cloud.hide_set(False)
+activate(cloud)
+bpy.ops.object.convert(target="POINTCLOUD")
+cloud = bpy.context.active_object
+report["cloud"] = cloud.type
+bpy.ops.cagefield.use_object()
+bpy.ops.cagefield.make_cages()
+settings().kind = "move"
+settings().inner.location.x += 0.5
+refresh()
+cloud_request = session.edit_request(settings(), bpy.context.evaluated_depsgraph_get())
+np.savez(folder / "cloud_request.npz", **cloud_request[1])
+bpy.ops.cagefield.update()
+save("cloud", settings().result)
+settings().kind = "continuous"
+
 # ---- a scene of cagefield ----
 bpy.ops.cagefield.open(filepath=str(folder / "scene" / "scene.json"))
 opened = settings().source

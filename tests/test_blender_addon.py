@@ -12,7 +12,6 @@ import re
 import subprocess
 import sys
 import zipfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -98,11 +97,11 @@ def splats_of(folder: Path, name: str) -> SplatField:
         return SplatField(**arrays)
 
 
-def edit_of(folder: Path, name: str, inner: Mapping[str, Any] | None = None) -> Edit:
+def edit_of(folder: Path, name: str, kind: str = "continuous") -> Edit:
     """The edit of arrays that the add-on sent."""
     with np.load(folder / f"{name}.npz") as arrays:
         content: dict[str, AnyArray] = dict(arrays)
-    header = {"kind": "continuous", "inner": inner or {"type": "mesh"}, "outer": {"type": "mesh"}}
+    header = {"kind": kind, "inner": {"type": "mesh"}, "outer": {"type": "mesh"}}
     return edit_from_request(Frame(header, content))
 
 
@@ -213,6 +212,14 @@ def test_a_lattice_object_is_a_lattice_cage(session: tuple[Path, dict[str, Any]]
     moved = np.abs(edit.deformed.handles - edit.inner.handles).max(axis=1) > 1e-6
     assert np.flatnonzero(moved).tolist() == [2, 3, 8, 9]
     assert_same(splats_of(folder, "lattice"), edited(splats_of(folder, "imported"), edit))
+
+
+def test_a_point_cloud_is_a_splat_object(session: tuple[Path, dict[str, Any]]) -> None:
+    folder, report = session
+    assert report["cloud"] == "POINTCLOUD"
+    edit = edit_of(folder, "cloud_request", kind="move")
+    np.testing.assert_allclose(edit.deformed.center - edit.inner.center, (0.5, 0, 0), atol=1e-6)
+    assert_same(splats_of(folder, "cloud"), edited(splats_of(folder, "imported"), edit))
 
 
 def test_a_scene_is_opened_upright(session: tuple[Path, dict[str, Any]]) -> None:
