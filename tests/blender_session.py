@@ -20,14 +20,15 @@ from mathutils import Euler, Matrix, Vector
 
 addon_utils = importlib.import_module("addon_utils")
 MODULE = "blender"  # the add-on's folder
-TIMEOUT_S = 300.0
+TIMEOUT_S = 1500.0  # on a machine that others use too
 
 folder = Path(sys.argv[1])
 report: dict[str, object] = {"version": bpy.app.version_string}
 bpy.ops.wm.read_factory_settings(use_empty=True)
 assert addon_utils.enable(MODULE, default_set=True) is not None
-from blender import live, session, splat_nodes, splat_objects
+from blender import live, session, splat_nodes, splat_objects, worker
 
+worker.START_TIMEOUT_S = TIMEOUT_S
 addon = bpy.context.preferences.addons[MODULE]
 report["license"] = (ROOT / "integrations/blender/LICENSE").read_text().strip().splitlines()[0].strip()
 

@@ -246,6 +246,8 @@ import bpy
 bpy.ops.wm.read_factory_settings(use_empty=True)
 bpy.ops.extensions.package_install_files(filepath={str(file)!r}, repo="user_default", enable_on_install=True)
 bpy.context.preferences.addons["bl_ext.user_default.cagefield"].preferences.python = {sys.executable!r}
+from bl_ext.user_default.cagefield import worker
+worker.START_TIMEOUT_S = 600.0
 bpy.ops.cagefield.check_python()
 print("status:", bpy.context.scene.cagefield.status)
 """

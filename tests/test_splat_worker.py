@@ -50,6 +50,7 @@ from splat_worker_requests import (
 )
 
 ROOT = Path(__file__).parents[1]
+TIMEOUT_S = 600.0
 INNER = Cage.box((0.1, 0, 0), (0.8, 0.7, 0.9))
 OUTER = INNER.grown(0.4)
 MOVED = INNER.rotate((0.1, 0.3, -0.2)).translate((0.05, 0.1, 0))
@@ -415,6 +416,7 @@ def test_splats_of_wrong_shapes_are_refused() -> None:
 
 def test_of_requests_that_wait_only_the_newest_is_sent() -> None:
     client = addon_module("worker")
+    client.START_TIMEOUT_S = TIMEOUT_S
     worker, version = client.started(sys.executable)
     try:
         assert version == cagefield.__version__
@@ -449,6 +451,7 @@ def test_of_requests_that_wait_only_the_newest_is_sent() -> None:
 
 def test_an_interpreter_without_cagefield_is_named_with_the_cure(tmp_path: Path) -> None:
     client = addon_module("worker")
+    client.START_TIMEOUT_S = TIMEOUT_S
     with pytest.raises(
         client.WorkerError, match="no Python with cagefield is chosen; set it in the add-on's"
     ):
@@ -484,7 +487,7 @@ def test_the_process_answers_refuses_and_goes_on(tmp_path: Path) -> None:
         again = worker.ask(request)
         assert worker.process.stdin is not None
         worker.process.stdin.close()
-        assert worker.process.wait(timeout=60) == 0
+        assert worker.process.wait(timeout=TIMEOUT_S) == 0
     edits = EditStack([edit_from_request(request)])
     expected = edited_splats(scene_of_splats(splats).with_edits(edits))
     for name in SPLAT_ARRAYS:
@@ -494,7 +497,7 @@ def test_the_process_answers_refuses_and_goes_on(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("content", [MALFORMED[1][0], MALFORMED[0][0], raw(listing(["a", "object", [1]]))])
 def test_a_malformed_frame_ends_the_process_with_one_line(content: bytes) -> None:
-    done = subprocess.run(COMMAND, input=content, capture_output=True, timeout=60)
+    done = subprocess.run(COMMAND, input=content, capture_output=True, timeout=TIMEOUT_S)
     assert done.returncode == 2
     lines = done.stderr.decode().splitlines()
     assert len(lines) == 1 and lines[0].startswith("cagefield: ")
@@ -504,7 +507,7 @@ def test_a_malformed_frame_ends_the_process_with_one_line(content: bytes) -> Non
 
 
 def test_wrong_arguments_are_refused() -> None:
-    done = subprocess.run([*COMMAND, "--parent", "me"], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([*COMMAND, "--parent", "me"], capture_output=True, text=True, timeout=TIMEOUT_S)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "usage: python -m cagefield.integrations.splat_worker [--parent PID]\n"
 
