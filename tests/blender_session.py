@@ -7,6 +7,7 @@ FOLDER has splats.ply. Each step writes what a test compares: arrays as .npz, an
 import importlib
 import json
 import os
+import signal
 import sys
 import time
 from pathlib import Path
@@ -190,9 +191,15 @@ inner.location = before
 refresh()
 
 # ---- the process ends: one line, and the next update starts another ----
+process._process.send_signal(signal.SIGSTOP)  # it has a request, and will never answer
+inner.location.y += 0.01
+refresh()
+live.tick()
 process._process.kill()
-process._process.wait()
-settings().live = False
+follow_until(lambda: not settings().live)
+report["killed"] = settings().status
+inner.location.y -= 0.01
+refresh()
 bpy.ops.cagefield.update()
 save("after_restart", settings().result)
 

@@ -61,9 +61,9 @@ def _on_load(*_):
 
 def tick():
     """Fetches results, and sends the newest shapes of cages that have changed."""
-    process = session.running()
+    process = session.latest()
     try:
-        if process is not None:
+        if process is not None and (process.is_running or process.is_busy):
             process.poll()
         for name in sorted(_changed):
             _changed.discard(name)
@@ -76,6 +76,8 @@ def tick():
                 scene.cagefield.status = str(error)
                 if isinstance(error, worker.WorkerError):
                     scene.cagefield.live = False
+        if isinstance(error, worker.WorkerError):
+            session.close()
 
 
 def _timer():

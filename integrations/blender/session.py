@@ -24,6 +24,11 @@ def running():
     return _current if _current is not None and _current.is_running else None
 
 
+def latest():
+    """The worker that was started last, which may have ended, or None."""
+    return _current
+
+
 def get_worker():
     """The worker of the chosen interpreter, started where it does not run. Raises WorkerError."""
     global _current
