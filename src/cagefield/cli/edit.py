@@ -52,9 +52,11 @@ class ApplyEdits:
         for edit in stack:
             if isinstance(edit, Paste) and edit.enabled:
                 scene.with_edits(EditStack([edit.replace(relight="none")])).prepared_edits  # noqa: B018  a scene that is not there
-        lines = describe_edits(stack, scene.field)
+        edited = scene.with_edits(stack)
+        edited.patcher.with_detours(stack.edits)
+        lines = describe_edits(edited)
         if not self.check:
             check_destination(destination, self.overwrite)
-            scene.with_edits(stack).save(destination, self.overwrite)
+            edited.save(destination, self.overwrite)
         print("\n".join(lines))
         print(f"{'checked, nothing written' if self.check else f'scene written to {destination}'}")

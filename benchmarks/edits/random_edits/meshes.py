@@ -1,4 +1,4 @@
-"""Random mesh cages and edits of them, for property tests."""
+"""Random mesh cages and edits of them."""
 
 from __future__ import annotations
 
