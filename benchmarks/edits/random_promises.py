@@ -192,9 +192,17 @@ def table(rows: Iterable[Promises], points: int, command: str) -> Table:
 
 
 def read_log(log: Path) -> list[Promises]:
-    """Rows of a log; none where it is not there yet. A last line that was cut off is left out."""
-    lines = log.read_text(encoding="utf-8").splitlines(keepends=True) if log.is_file() else []
-    return [Promises(**json.loads(line)) for line in lines if line.endswith("\n")]
+    """Rows of a log; none where it is not there yet. Lines that a kill has cut off are left out."""
+    lines = log.read_text(encoding="utf-8").splitlines() if log.is_file() else []
+    return [Promises(**json.loads(line)) for line in lines if line.endswith("}")]
+
+
+def append(log: Path, row: Promises) -> None:
+    """One more row at the end of a log; on a line of its own after one that a kill has cut off."""
+    with log.open("a+", encoding="utf-8") as file:
+        file.seek(0)
+        start = "" if not (before := file.read()) or before.endswith("\n") else "\n"
+        file.write(start + json.dumps(asdict(row)) + "\n")
 
 
 def main() -> None:
@@ -212,8 +220,7 @@ def main() -> None:
         for row in pool.imap_unordered(run, todo):
             rows.append(row)
             if options.log is not None:
-                with options.log.open("a", encoding="utf-8") as log:
-                    log.write(json.dumps(asdict(row)) + "\n")
+                append(options.log, row)
             if row.failures:
                 print(f"{', '.join(row.failures)}: {row}", flush=True)
     command = f"python -m benchmarks.edits.random_promises --edits {options.edits} --points {options.points}"
