@@ -40,6 +40,7 @@ from cagefield.geometry.cage import Axes, Cage
 from cagefield.geometry.cage_checks import format_vector
 from cagefield.geometry.control_points import ControlPoints
 from cagefield.geometry.face_distance import outside_by
+from cagefield.geometry.mesh_cage import MeshCage
 from cagefield.geometry.reach_cage import ReachCage
 from cagefield.typing import Array, Float32
 from cagefield.warps import (
@@ -385,7 +386,7 @@ class Continuous(Edit):
 
     Parameters, besides those of `Edit`
     - outer: the outer cage V^o, which confines the edit. None for control points takes the box around all
-      that they reach on their way, a `ReachCage`.
+      that they reach on their way, a `ReachCage`. A `MeshCage` confines another mesh.
     - shell: kind of the map between the cages, `Flow` (cannot fold) or `Trilinear` (the paper's).
     - lattice: None evaluates the shell exactly at every sample; an integer R interpolates it from R^3 nodes
       (64, 128 or 256 in the paper). The inner region is exact either way.
@@ -411,6 +412,10 @@ class Continuous(Edit):
             self._refuse(
                 "a continuous edit needs an outer cage; give one (inner.grown(margin), say) or make the"
                 " edit discrete"
+            )
+        if isinstance(self.outer, MeshCage) and not isinstance(self.inner, MeshCage):
+            self._refuse(
+                "a mesh as outer cage holds a mesh alone; give MeshCage.of_box(inner), or a box as outer cage"
             )
 
     @property
@@ -582,6 +587,13 @@ class Continuous(Edit):
         handles = deformed.handles
         has_corners = self.inner.is_hexahedron
         outside = np.flatnonzero(~self.outer.contains(handles))
+        if len(outside) and isinstance(self.outer, MeshCage):
+            k = int(outside[0])
+            return (
+                f"outer cage must contain the inner cage: {deformed.handle_noun} {k} at"
+                f" {format_vector(handles[k])} is outside of its mesh",
+                "; enlarge the outer cage",
+            )
         if len(outside):
             face, distance, k = max(
                 ((*outside_by(self.outer, handles[k]), int(k)) for k in outside),
