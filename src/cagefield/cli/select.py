@@ -88,7 +88,8 @@ class Select:
                 f"without -o the scene {self.scene} itself would change; give -o NEW_SCENE, or --overwrite"
             )
         if self.restore:
-            return self._write_restored(self.out or self.scene)
+            self._write_restored(self.out or self.scene)
+            return
         if self.to_cage is not None and self.to_cage.exists() and not self.overwrite:
             raise CagefieldError(f"{self.to_cage} exists already; give another name, or --overwrite")
         if changes:

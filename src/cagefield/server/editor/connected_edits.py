@@ -81,11 +81,16 @@ class ConnectedEdits:
         self._found[wanted.points] = wanted, found
 
 
+def is_unprepared(edit: Edit) -> bool:
+    """True of an edit of connected control points, which has no detours in a session."""
+    return _unprepared(edit) is not None
+
+
 def _unprepared(edit: Edit) -> ControlPoints | None:
-    """The connected control points of an edit; None of another."""
     points = edit.inner
-    is_connected = isinstance(edit, Continuous) and isinstance(points, ControlPoints) and points.is_unprepared
-    return points if is_connected and isinstance(points, ControlPoints) else None
+    if isinstance(edit, Continuous) and isinstance(points, ControlPoints) and points.is_unprepared:
+        return points
+    return None
 
 
 def _detours(edit: Edit) -> DetourGrid | None:

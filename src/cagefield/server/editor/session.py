@@ -33,7 +33,7 @@ from cagefield.server.editor.chain_edits import (
     with_parent,
     without,
 )
-from cagefield.server.editor.connected_edits import ConnectedEdits, Wanted
+from cagefield.server.editor.connected_edits import ConnectedEdits, Wanted, is_unprepared
 from cagefield.server.editor.document import Document, Entry
 from cagefield.server.editor.drag_solver import Moved, Target, move
 from cagefield.server.editor.edit_kinds import Kind, with_kind, with_options, with_outer, with_shell
@@ -155,8 +155,12 @@ class Session:
     def detours_wanted(self) -> Wanted | None:
         """Connected control points whose detours pages and pictures need and the session does not know."""
         applied, removed = self.shown.applied, self.shown.removed
-        enabled = ((entry.edit, at) for at, entry in enumerate(applied) if entry.edit.enabled)
-        return self._connected.wanted(((edit, self._drawn(applied[:at])) for edit, at in enabled), removed)
+        edits = [
+            (entry.edit, self._drawn(applied[:at]))
+            for at, entry in enumerate(applied)
+            if entry.edit.enabled and is_unprepared(entry.edit)
+        ]
+        return self._connected.wanted(edits, removed)
 
     def detours_found(self, wanted: Wanted, found: DetourGrid | str) -> None:
         """Detours that were wanted, or why there are none, which is then the edit's problem."""
