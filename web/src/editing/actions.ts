@@ -147,7 +147,9 @@ export class Actions {
         return this.app.say("connected only is for control points (Ctrl+double-click)", "warning");
       const connected = !edit.points.connected;
       this.app.send({ type: "point_reach", edit: edit.id, connected });
-      this.app.say(`connected only is ${connected ? "on: the points reach through dense matter alone" : "off"}`);
+      this.app.say(
+        `connected only is ${connected ? "on: the points reach through dense matter alone" : "off"}`,
+      );
     });
   }
 
