@@ -115,7 +115,7 @@ def test_voxels(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     text = run(capsys, tmp_path / "ball", "--flood", 0, 0, 0)
     count, total = (int(text.split()[n]) for n in (0, 2))
     assert count == total > 100 and "cells" in text
-    run(capsys, tmp_path / "ball", "--value", 0, 1, "--shrink", 3, "--remove", "--overwrite")
+    run(capsys, tmp_path / "ball", "--flood", -0.5, 0, 0, "--flood-reach", 0.3, "--remove", "--overwrite")
     first = Scene.open(tmp_path / "ball").removal
     assert first is not None and 0 < first.selection.count < total
     left = np.linalg.norm(elements_of_field(Scene.open(tmp_path / "ball").field).positions, axis=1)
