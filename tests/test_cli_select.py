@@ -12,6 +12,7 @@ from cagefield.edits import Edit, EditStack, load_edits
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import Cage
 from cagefield.scene.scene import Scene
+from cagefield.selection.field_elements import elements_of_field
 from scenes import ball_scene
 from splat_scenes import BALL_RADIUS, ball_and_floor
 
@@ -66,11 +67,42 @@ def test_criteria_are_met_together(capsys: pytest.CaptureFixture[str], scene: Pa
     assert int(grown.split()[0]) > 800
 
 
-def test_elements_are_removed(capsys: pytest.CaptureFixture[str], scene: Path, tmp_path: Path) -> None:
+def info(capsys: pytest.CaptureFixture[str], scene: Path) -> str:
+    assert main(["info", str(scene)]) == 0
+    return capsys.readouterr().out
+
+
+def test_elements_are_removed_and_restored(
+    capsys: pytest.CaptureFixture[str], scene: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "clean"
-    assert f"written to {out}" in run(capsys, scene, "--opacity", 0, 0.85, "--remove", "-o", out)
+    assert "deleted " not in info(capsys, scene)
+    assert f"800 of 1376 deleted written to {out}" in run(
+        capsys, scene, "--opacity", 0, 0.85, "--remove", "-o", out
+    )
     field = Scene.open(out).field
     assert isinstance(field, SplatField) and len(field) == 576
+    assert "deleted     800 of 1376 splats" in info(capsys, out)
+    # More of what is left, in place; numbers are those of the whole field.
+    text = run(capsys, out, "--flood", -1, -1, -0.3, "--flood-reach", 0.3, "--remove", "--overwrite")
+    count = int(text.split()[0])
+    assert 0 < count < 576 and f"{800 + count} of 1376 deleted" in text
+    left, whole = Scene.open(out).field, Scene.open(out, whole=True).field
+    assert isinstance(left, SplatField) and len(left) == 576 - count and len(whole) == 1376  # type: ignore[arg-type]
+    floor = np.linalg.norm(left.means - np.array([-1.0, -1.0, -0.3]), axis=1)
+    assert floor.min() > 0.2
+    before = (out / "removed.json").read_bytes()
+    assert "nothing deleted" in run(capsys, out, "--opacity", 0, 0.85, "--remove", "--overwrite")
+    assert (out / "removed.json").read_bytes() == before
+    back = tmp_path / "back"
+    assert f"scene with all 1376 written to {back}" in run(capsys, out, "--restore", "-o", back)
+    run(capsys, out, "--restore", "--overwrite")
+    for folder in (out, back):
+        assert len(Scene.open(folder).field) == 1376  # type: ignore[arg-type]
+        assert not (folder / "removed.json").exists()
+        assert "deleted " not in info(capsys, folder)
+    assert "nothing is deleted from" in refused(capsys, out, "--restore", "--overwrite")
+    run(capsys, scene, "--opacity", 0, 0.85, "--remove", "-o", out, "--overwrite")
     assert "exists already" in refused(capsys, scene, "--opacity", 0, 0.85, "--remove", "-o", out)
     assert "leave something" in refused(
         capsys, scene, "--opacity", 0, 1, "--remove", "-o", out, "--overwrite"
@@ -83,12 +115,26 @@ def test_voxels(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     text = run(capsys, tmp_path / "ball", "--flood", 0, 0, 0)
     count, total = (int(text.split()[n]) for n in (0, 2))
     assert count == total > 100 and "cells" in text
+    run(capsys, tmp_path / "ball", "--flood", -0.5, 0, 0, "--flood-reach", 0.3, "--remove", "--overwrite")
+    first = Scene.open(tmp_path / "ball").removal
+    assert first is not None and 0 < first.selection.count < total
+    left = np.linalg.norm(elements_of_field(Scene.open(tmp_path / "ball").field).positions, axis=1)
+    run(capsys, tmp_path / "ball", "--flood", 0.5, 0, 0, "--flood-reach", 0.2, "--remove", "--overwrite")
+    second = Scene.open(tmp_path / "ball").removal
+    assert second is not None and second.selection.total == total
+    assert (second.selection.mask >= first.selection.mask).all()
+    more = second.selection.mask & ~first.selection.mask
+    near = np.linalg.norm(elements_of_field(second.field).positions[more] - np.array([0.5, 0, 0]), axis=1)
+    assert 0 < more.sum() < len(left) and near.max() < 0.4
+    run(capsys, tmp_path / "ball", "--restore", "--overwrite")
     assert "0 of" in run(capsys, tmp_path / "ball", "--floaters", 0.5)
 
 
 def test_what_cannot_be_is_refused(capsys: pytest.CaptureFixture[str], scene: Path) -> None:
     assert "give --flood X Y Z" in refused(capsys, scene)
-    assert "give both --remove and -o" in refused(capsys, scene, "--opacity", 0, 1, "--remove")
+    assert "give -o NEW_SCENE, or --overwrite" in refused(capsys, scene, "--opacity", 0, 1, "--remove")
+    assert "give one of them" in refused(capsys, scene, "--opacity", 0, 1, "-o", scene.parent / "x")
+    assert "--restore goes alone" in refused(capsys, scene, "--restore", "--remove", "--overwrite")
     assert "low <= high" in refused(capsys, scene, "--opacity", 1, 0)
     assert "strength of floaters" in refused(capsys, scene, "--floaters", 3)
     assert "0 or more" in refused(capsys, scene, "--opacity", 0, 1, "--grow", -1)

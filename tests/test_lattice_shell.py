@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from benchmarks.edits.random_edits.lattices import random_lattice_edit
 
 from cagefield import Cage, Edit, EditStack
 from cagefield.edits import Continuous, MovePoints
@@ -13,7 +14,6 @@ from cagefield.typing import Array
 from cagefield.warps import LatticeShell
 from cagefield.warps.lattice_flow import sampled, slope_bound
 from cagefield.warps.lattice_motion import MOST_TURN, Piece
-from lattice_edits import random_lattice_edit
 
 ARM = Cage.box((0, 0, 0), (0.3, 0.3, 1.0)).subdivided((1, 1, 4))
 AROUND = Cage.box((0, 0, 0), 2.4)

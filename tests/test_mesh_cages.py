@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from benchmarks.edits.random_edits.meshes import KINDS, random_mesh, random_mesh_edit
 
 from cagefield.edits import Continuous, Edit
 from cagefield.errors import CageError, EditError
@@ -15,7 +16,6 @@ from cagefield.typing import Array
 from cagefield.warps import MeshShell
 from cagefield.warps.lattice_flow import slope_bound
 from cagefield.warps.mesh_flow import MeshPiece, blend
-from random_meshes import KINDS, random_mesh, random_mesh_edit
 
 BOX = Cage.box((0, 0, 0), 0.8)
 CUBE = MeshCage.of_box(BOX)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -12,7 +13,10 @@ from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError, EditError, SceneError
 from cagefield.exporting import edited_splats
+from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import Cage
+from cagefield.pages.page_splat_edits import decode_page_splat_edits
+from cagefield.pages.page_splats import page_order
 from cagefield.scene.removed_elements import Removal
 from cagefield.scene.scene import Scene
 from cagefield.selection.element_selection import Selection
@@ -23,8 +27,10 @@ from cagefield.server.editor.document import Document
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.render_queue.splat_downloads import write_edited
+from cagefield.server.render_worker.page_files import PageFiles
+from cagefield.server.render_worker.refinement import Refinement
 from cagefield.server.render_worker.renderer_cache import RendererCache
-from cagefield.server.render_worker.tasks import Shown, values_of
+from cagefield.server.render_worker.tasks import EditsDone, PageEditsTask, Shown, values_of
 from cagefield.server.render_worker.view import Display
 from scenes import ball_field
 from splat_scenes import BALL_RADIUS, ball_and_floor
@@ -112,6 +118,37 @@ def test_pictures_picks_and_downloads_are_of_what_is_left(scene: Path, tmp_path:
     assert not np.allclose(renderers.still(Shown(()), CAMERA, Display()).rgb, found, atol=0.1)
     count = write_edited(str(scene), (), True, str(tmp_path / "out" / "rest.ply"), ball)
     assert count == ball.total - ball.count
+
+
+def test_pages_hide_deleted_splats_beside_what_edits_change(scene: Path) -> None:
+    whole = Scene.open(scene, whole=True)
+    assert isinstance(whole.field, SplatField)
+    ball = ball_of(whole)
+    half = Selection.from_mask(ball.mask & (whole.field.means[:, 0] > 0.0))
+    pages = PageFiles(RendererCache(whole))
+    raised = Edit.continuous(Cage.box((0, 0, 0), 0.7), Cage.box((0, 0, 0), 1.4)).translate((0, 0, 0.1))
+    raised = raised.replace(relight="none")
+    for edits in ((), (raised,)):
+        shown = Shown(values_of(edits), removed=half)
+        done = pages.edits(PageEditsTask(1, shown, Refinement.DRAFT, (), 0), lambda: False)
+        assert isinstance(done, EditsDone)
+        found = decode_page_splat_edits(done.content)
+        order = page_order(whole.field)
+        assert found.hidden[half.mask[order]].all() and not half.mask[order][found.sources].any()
+        # The oracle: the file of a scene that never had the deleted splats.
+        oracle = dataclasses.replace(whole, field=whole.field.take(~half.mask), edits=EditStack(edits))
+        alone = PageFiles(RendererCache(oracle))
+        done = alone.edits(PageEditsTask(1, Shown(values_of(edits)), Refinement.DRAFT, (), 0), lambda: False)
+        assert isinstance(done, EditsDone)
+        expected = decode_page_splat_edits(done.content)
+        assert found.hidden.sum() - half.count == expected.hidden.sum()
+        there = np.sort(found.means + whole.field.center, axis=0)
+        np.testing.assert_allclose(there, np.sort(expected.means + oracle.field.center, axis=0), atol=1e-6)
+    assert len(expected.means) > 100
+    voxels = PageFiles(RendererCache(Scene(ball_field())))
+    some = Selection.from_mask(np.arange(len(elements_of_field(ball_field()))) < 3)
+    with pytest.raises(CagefieldError, match="the server draws the others"):
+        voxels.edits(PageEditsTask(1, Shown((), removed=some), Refinement.DRAFT, (), 0), lambda: False)
 
 
 def test_voxels_lose_the_vertices_of_deleted_cells(tmp_path: Path) -> None:

@@ -172,6 +172,17 @@ def test_a_control_point_is_placed_and_its_reach_changed() -> None:
     inner = s.document.entry(number).edit.inner
     assert isinstance(inner, ControlPoints) and (inner.radius, inner.falloff) == (0.4, "sharp")
     assert s.history.names[-3:] == ("Move of points", "Reach of points", "Reach of points")
+    before = s.document
+    s.point_reach(number, None, None, True)
+    state = edit_state(s.document.entry(number), None, None)
+    assert state.points is not None and state.points.connected and state.points.radius == 0.4
+    s.undo()
+    assert s.document == before
+    s.redo()
+    s.point_reach(number, None, None, True)
+    assert s.history.names[-1] == "Reach of points" and s.history.names[-2] == "Reach of points"
+    s.point_reach(number, None, None, False)
+    assert s.document.entry(number) == before.entry(number)
     other = session(ARM)
     with pytest.raises(EditError, match="only control points have a radius"):
         other.point_reach(1, 0.2, None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -237,6 +238,12 @@ def test_specks_do_not_count_when_a_cage_is_fitted() -> None:
     np.testing.assert_allclose(fit_to_content(cage, dense).corners, expected.corners, atol=0.13)
 
 
+def session_of(drawn: Callable[[], tuple[Edit, ...]], moving: bool = False) -> Any:
+    """A session as background work asks it, without connected control points."""
+    shown = SimpleNamespace(removed=None)
+    return SimpleNamespace(moving=moving, drawn=drawn, shown=shown, detours_wanted=lambda: None)
+
+
 def test_the_grid_bends_with_the_edit() -> None:
     devices.start()
     lines = grid_lines(MOVED.replace(lattice=None))
@@ -265,7 +272,7 @@ def test_measuring_a_lattice_is_given_up_and_done_again_later(renderers: Rendere
     task = ErrorTask(1, values_of((MOVED,))[0], 0)
     stopped = TaskHandlers(renderers).do(task, lambda _: True)
     assert isinstance(stopped, Stopped)
-    session: Any = SimpleNamespace(moving=False, drawn=lambda: (MOVED,))
+    session = session_of(lambda: (MOVED,))
     measured = []
     background = BackgroundWork(session, Any, lambda: measured.append(1), lambda _: None)  # type: ignore[arg-type]
     background.warming, background.light_known = [], True
@@ -280,7 +287,7 @@ def test_measuring_a_lattice_is_given_up_and_done_again_later(renderers: Rendere
 
 def test_light_is_found_once_a_cage_needs_it_and_again_where_it_was_cancelled() -> None:
     edits: tuple[Edit, ...] = (MOVED.replace(relight="none"),)
-    session: Any = SimpleNamespace(moving=True, drawn=lambda: edits)
+    session = session_of(lambda: edits, moving=True)
     background = BackgroundWork(session, Any, lambda: None, lambda _: None)  # type: ignore[arg-type]
     background.warming = []
     assert background.next(0) is None
@@ -293,7 +300,7 @@ def test_light_is_found_once_a_cage_needs_it_and_again_where_it_was_cancelled() 
 
 
 def test_light_is_found_before_the_first_cage_while_there_is_time() -> None:
-    session: Any = SimpleNamespace(moving=False, drawn=lambda: ())
+    session = session_of(lambda: ())
     background = BackgroundWork(session, Any, lambda: None, lambda _: None)  # type: ignore[arg-type]
     background.warming = []
     assert background.next(0) is None

@@ -14,11 +14,12 @@ from cagefield.geometry.cage import Cage
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.path_edits import edits_at_time
 from cagefield.server.editor.session import Session
-from cagefield.server.protocol.conversion import state_of
+from cagefield.server.protocol.conversion import dragged_of, state_of
 
 BOUNDS = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
 ARM_CAGE = Cage.box((0, 0, 0), (0.8, 0.3, 0.3))
 ARM = Edit.continuous(ARM_CAGE, ARM_CAGE.grown(0.6), lattice=16, name="arm").rotate((0, 0, np.pi / 2))
+LEG = Edit.move(Cage.box((0, 0, -0.5), 0.2), name="leg")
 FINGER_CAGE = Cage.box((0.3, 0, 0), 0.1)
 FINGER = Edit.continuous(FINGER_CAGE, FINGER_CAGE.grown(0.1), lattice=16, name="finger").translate(
     (0, 0, 0.02)
@@ -116,6 +117,21 @@ def test_carriers_are_where_the_parent_takes_the_cages_and_follow_its_drag() -> 
     np.testing.assert_allclose(carrier(), quarter, atol=1e-9)
     s.change(1, enabled=False)
     np.testing.assert_array_equal(carrier(), np.eye(3, 4))
+
+
+def test_a_drag_tells_where_it_carries_children_of_children_and_nobody_else() -> None:
+    s = session(ARM, FINGER.replace(parent="arm"), FINGER.replace(name="nail", parent="finger"), LEG)
+    s.drag_begin(7, 1, 1, "field")
+    moved = s.drag(7, 1, Translate((0.0, 0.1, 0.0)))
+    carriers = s.carriers_of(7)
+    assert list(carriers) == [2, 3] and s.carriers_of(8) == {}
+    message = dragged_of(1, 1, moved, carriers)
+    for carried, edit in zip(message.carried, state_of(s, "", 1, {}).edits[1:], strict=False):
+        assert carried.carrier is not None and carried.carrier == edit.carrier
+    s.drag_cancel(7)
+    s.drag_begin(7, 2, 4, "field")
+    s.drag(7, 2, Translate((0.0, 0.1, 0.0)))
+    assert s.carriers_of(7) == {}
 
 
 def test_a_camera_path_shows_the_chain_at_its_parts() -> None:

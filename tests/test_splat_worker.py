@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.edits.random_edits.meshes import random_mesh
 from scipy.spatial.transform import Rotation
 
 import cagefield
@@ -39,7 +40,6 @@ from cagefield.integrations.splat_deformer import (
     scene_of_splats,
     splat_arrays,
 )
-from random_meshes import random_mesh
 from splat_scenes import random_splats
 from splat_worker_requests import (
     COMMAND,

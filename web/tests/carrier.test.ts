@@ -1,10 +1,16 @@
 import { describe, expect, it } from "vitest";
 import { Matrix3, Quaternion, Vector3 } from "three";
-import { carrierRotation, carryCages, carryPoint, operationAtRest } from "../src/editing/carrier";
+import {
+  carrierRotation,
+  carryCages,
+  carryPoint,
+  operationAtRest,
+  withCarriers,
+} from "../src/editing/carrier";
 import { cagesOf } from "../src/editing/drag";
 import { apply, type Operation } from "../src/editing/operations";
 import { candidates } from "../src/ui/parent_row";
-import type { Vec3 } from "../src/net/protocol";
+import type { State, Vec3 } from "../src/net/protocol";
 import { expectClose } from "./cages";
 import { edit } from "./fake_server";
 
@@ -49,6 +55,22 @@ describe("carriers", () => {
     expect(operationAtRest(CARRIER, turn)).toBe(turn);
     expect(operationAtRest(CARRIER, scale)).toBe(scale);
     expect(operationAtRest(null, { kind: "translate", by })).toEqual({ kind: "translate", by });
+  });
+});
+
+describe("carriers during a drag", () => {
+  it("take the place of those of the edits that are carried, and of no others", () => {
+    const finger = edit({ id: 2, carrier: null });
+    const other = edit({ id: 3, carrier: CARRIER });
+    const back = edit({ id: 4, carrier: CARRIER });
+    const state = { edits: [finger, other, back] } as unknown as State;
+    const { edits } = withCarriers(state, [
+      { edit: 2, carrier: CARRIER },
+      { edit: 4, carrier: null },
+    ]);
+    expect(edits.map((each) => each.carrier)).toEqual([CARRIER, CARRIER, null]);
+    expect(edits[1]).toBe(other);
+    expect(finger.carrier).toBeNull();
   });
 });
 

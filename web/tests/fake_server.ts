@@ -74,7 +74,7 @@ export class FakeServer {
   answer(part: number, deformed: Corners, why: string | null): Dragged {
     const drag = this.got.filter((message) => message.type === "drag").at(-1)!;
     const { inner, outer } = edit();
-    const points = { points: [], deformed_points: [] };
+    const points = { points: [], deformed_points: [], carried: [] };
     return { type: "dragged", drag: drag.drag, seq: drag.seq, part, why, inner, deformed, outer, ...points };
   }
 }

@@ -47,6 +47,7 @@ const ON_THEIR_OWN: PointsState = {
   interpolation: null,
   radius: 0.2,
   falloff: "smooth",
+  connected: false,
 };
 
 describe("a lattice", () => {
@@ -155,6 +156,7 @@ describe("control points on their own", () => {
         [8, 0, 0],
         [0.3, 0, 0],
       ],
+      carried: [],
     });
     expectClose(drag.shown.deformed.points![0], [8, 0, 0]);
   });

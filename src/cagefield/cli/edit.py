@@ -34,6 +34,7 @@ class ApplyEdits:
         from cagefield.edits import EditStack, Paste
         from cagefield.edits.edit_files import load_edits
         from cagefield.edits.paste_paths import rebased
+        from cagefield.geometry.control_points import ControlPoints
         from cagefield.scene.scene import Scene
         from cagefield.scene.scene_files import check_destination
 
@@ -52,9 +53,12 @@ class ApplyEdits:
         for edit in stack:
             if isinstance(edit, Paste) and edit.enabled:
                 scene.with_edits(EditStack([edit.replace(relight="none")])).prepared_edits  # noqa: B018  a scene that is not there
-        lines = describe_edits(stack, scene.field)
+        edited = scene.with_edits(stack)
+        if any(isinstance(edit.inner, ControlPoints) and edit.inner.is_unprepared for edit in stack):
+            edited.patcher.with_detours(stack.edits)
+        lines = describe_edits(edited)
         if not self.check:
             check_destination(destination, self.overwrite)
-            scene.with_edits(stack).save(destination, self.overwrite)
+            edited.save(destination, self.overwrite)
         print("\n".join(lines))
         print(f"{'checked, nothing written' if self.check else f'scene written to {destination}'}")

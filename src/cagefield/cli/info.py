@@ -52,6 +52,10 @@ class Info:
         print(f"field       {content}")
         print(f"            {kind} {size} around {_point(field.center)}")
         print(f"            {details}, colour SH degree {field.sh_degree}")
+        if scene.removal is not None:
+            deleted = scene.removal.selection
+            noun = "splats" if isinstance(field, SplatField) else "cells"
+            print(f"deleted     {deleted.count} of {deleted.total} {noun} (`cagefield select --restore`)")
         if scene.original is not None:
             print("\n".join(_original(scene.original)))
         background = "none" if scene.background is None else _point(scene.background)
@@ -66,7 +70,7 @@ class Info:
         if scene.gains:
             low, high = (choose(map(choose, scene.gains)) for choose in (min, max))
             print(f"exposure    gains of {len(scene.gains)} training photos, from {low:.3f} to {high:.3f}")
-        for line in describe_edits(scene.edits, field):
+        for line in describe_edits(scene):
             print(f"edits       {line}")
 
 

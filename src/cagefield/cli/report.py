@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.edits import Continuous, Copy, Delete, Discrete, Paste
+from cagefield.edits.chains import application_order
 from cagefield.edits.grade_nodes import dump_grade
 from cagefield.edits.options import Clone
 from cagefield.errors import EditError
@@ -17,6 +18,7 @@ from cagefield.fields.contraction import uncontract
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry import hexahedron_determinant
 from cagefield.geometry.cage_checks import format_vector
+from cagefield.geometry.control_points import ControlPoints
 from cagefield.typing import Array
 from cagefield.warps.continuous import ContinuousWarp
 
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from cagefield.edits import Edit
     from cagefield.fields.voxel_field import VoxelField
     from cagefield.geometry.cage import Cage
+    from cagefield.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -50,17 +53,33 @@ class _Content:
         return float(self.weights[mask].sum(dtype=np.float64)) / total if total > 0.0 else 0.0
 
 
-def describe_edits(edits: Iterable[Edit], field: VoxelField | SplatField) -> list[str]:
-    """Per edit, in the order of the stack: a line with its kind, and indented lines with its changes.
+def describe_edits(scene: Scene) -> list[str]:
+    """Per edit of a scene, in the order of the stack: a line with its kind, indented ones with its changes.
 
     The shares are of the field's stored voxels, or of its splats' opacities, inside the canonical inner cage
     and in the shell around it. An edit that cannot be evaluated says why.
     """
-    content = _Content.from_field(field)
+    content = _Content.from_field(scene.field)
     lines: list[str] = []
-    for number, edit in enumerate(edits, start=1):
-        lines += [f"{number}. {_title(edit)}", *("   " + line for line in _details(edit, content))]
+    for number, edit in enumerate(scene.edits):
+
+        def resolved(number: int = number) -> Edit:
+            return _with_detours(scene, number)
+
+        details = _details(edit, content, resolved)
+        lines += [f"{number + 1}. {_title(edit)}", *("   " + line for line in details)]
     return lines or ["no edits"]
+
+
+def _with_detours(scene: Scene, number: int) -> Edit:
+    """An edit of the scene, with the detours of connected control points. Raises `EditError` without any."""
+    edits = scene.edits.edits
+    points = edits[number].inner
+    if not (isinstance(points, ControlPoints) and points.is_unprepared):
+        return edits[number]
+    order = application_order(edits)
+    below = [edits[other].without_parent for other in order[: order.index(number)]]
+    return scene.patcher.with_detours([*below, edits[number].without_parent])[-1]
 
 
 def _title(edit: Edit) -> str:
@@ -73,7 +92,8 @@ def _title(edit: Edit) -> str:
     elif isinstance(edit, Continuous):
         nodes = edit.kernel_lattice
         how = "exact" if nodes is None else f"lattice of {nodes}^3 nodes"
-        kind = f"continuous, {edit.shell.name} shell, {how}"
+        connected = isinstance(edit.inner, ControlPoints) and edit.inner.connected
+        kind = f"continuous, {edit.shell.name} shell, {how}{', connected points' * connected}"
     else:
         kind = "discrete copy" if isinstance(edit, Copy) else "discrete move"
     carried = f', carried by "{edit.parent}"' if edit.parent else ""
@@ -89,7 +109,7 @@ def _left_out(edit: Edit) -> str:
     return fill + (", relight: none" if edit.relight == "none" else "")
 
 
-def _details(edit: Edit, content: _Content) -> Iterable[str]:
+def _details(edit: Edit, content: _Content, resolved: Callable[[], Edit]) -> Iterable[str]:
     inside = edit.inner.contains(content.positions)
     share = content.share(inside)
     if isinstance(edit, Delete):
@@ -119,6 +139,7 @@ def _details(edit: Edit, content: _Content) -> Iterable[str]:
         f"{reach:.4g}{volume}"
     )
     try:
+        edit = resolved()
         warp = edit.exact_warp
     except EditError as error:
         yield f"cannot be evaluated: {error}"

@@ -63,9 +63,12 @@ class Select:
     margin: float | None = None
     """Distance from the selection to the cage, world units; left out, the edge of a cell."""
     remove: Flag = False
-    """Write the scene without the selected elements to -o."""
+    """Delete the selected elements: the field stays whole, and a file beside it names them."""
+    restore: Flag = False
+    """Bring all deleted elements back; takes no criteria."""
     out: OptionalOutput = None
-    """New scene folder, for --remove."""
+    """New scene folder, for --remove and --restore; left out, the scene itself is changed, which needs
+    --overwrite."""
     overwrite: Flag = False
     """Replace the scene or the edit file that is there."""
 
@@ -77,12 +80,20 @@ class Select:
         from cagefield.selection.element_positions import deformed_positions
         from cagefield.selection.field_elements import elements_of_field
 
-        if self.remove != (self.out is not None):
-            raise CagefieldError("--remove writes a new scene: give both --remove and -o NEW_SCENE")
+        changes = self.remove or self.restore
+        if self.out is not None and not changes:
+            raise CagefieldError("-o is for the scene of --remove or --restore; give one of them")
+        if changes and self.out is None and not self.overwrite:
+            raise CagefieldError(
+                f"without -o the scene {self.scene} itself would change; give -o NEW_SCENE, or --overwrite"
+            )
+        if self.restore:
+            self._write_restored(self.out or self.scene)
+            return
         if self.to_cage is not None and self.to_cage.exists() and not self.overwrite:
             raise CagefieldError(f"{self.to_cage} exists already; give another name, or --overwrite")
-        if self.out is not None:
-            check_destination(self.out, self.overwrite)
+        if changes:
+            check_destination(self.out or self.scene, self.overwrite)
         scene = Scene.open(self.scene)
         elements = elements_of_field(scene.field)
         edits = EditStack(scene.patcher.with_detours(scene.edits.resolved))
@@ -92,8 +103,8 @@ class Select:
         print(f"{np.count_nonzero(mask)} of {len(mask)} {noun} selected")
         if self.to_cage is not None:
             self._write_cage(elements, seen, mask, self.to_cage)
-        if self.out is not None:
-            self._write_rest(scene, elements, mask, self.out)
+        if self.remove:
+            self._write_rest(scene, elements, mask, self.out or self.scene)
 
     def _selected(self, elements: Elements, seen: DeformedPositions) -> Mask:
         from cagefield.selection.elements import ATTRIBUTES
@@ -136,13 +147,32 @@ class Select:
         print(f"cage written to {path}; apply it after the scene's edits with `cagefield edit --append`")
 
     def _write_rest(self, scene: Scene, elements: Elements, mask: Mask, out: Path) -> None:
-        from cagefield.selection.field_elements import without_elements
+        from cagefield.scene.removed_elements import removed_also
 
         if scene.original is not None:
             raise CagefieldError(
                 "the scene has the NeRF that its voxels were baked from, of which nothing can be removed; "
                 "delete with a cage (--to-cage), or bake voxels alone"
             )
-        rest = without_elements(scene.field, elements, mask)
-        dataclasses.replace(scene, field=rest, removal=None).save(out, self.overwrite)
-        print(f"scene without them written to {out}")
+        if mask.all():
+            raise CagefieldError("the selection is all of the field; leave something, or invert it")
+        if not mask.any():
+            print(f"nothing deleted, nothing written: the selection is empty, {out} stays as it is")
+            return
+        removal = removed_also(scene.removal, scene.field, elements, mask)
+        dataclasses.replace(scene, removal=removal).save(out, self.overwrite)
+        deleted = removal.selection
+        print(f"scene with {deleted.count} of {deleted.total} deleted written to {out}")
+
+    def _write_restored(self, out: Path) -> None:
+        from cagefield.scene.scene import Scene
+        from cagefield.scene.scene_files import check_destination
+
+        if self.remove or self.to_cage is not None:
+            raise CagefieldError("--restore goes alone: it brings all deleted elements back")
+        check_destination(out, self.overwrite)
+        scene = Scene.open(self.scene)
+        if scene.removal is None:
+            raise CagefieldError(f"nothing is deleted from {self.scene}; there is nothing to restore")
+        dataclasses.replace(scene, field=scene.removal.field, removal=None).save(out, self.overwrite)
+        print(f"scene with all {scene.removal.selection.total} written to {out}")

@@ -11,6 +11,7 @@ from typing import cast
 
 from cagefield.cameras.camera import Camera
 from cagefield.completion.continuous_relighting import extract_bent_block, light_edit, relight_voxels
+from cagefield.completion.detour_cache import DetourCache
 from cagefield.completion.discrete_patch import build_patch
 from cagefield.completion.lighting.ambient_occlusion import (
     LightModel,
@@ -37,11 +38,8 @@ from cagefield.edits.options import CastShadow
 from cagefield.edits.patch import Pasted, Patch, SplatPatch
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.geometry.control_points import ControlPoints
 from cagefield.images.render_result import RenderResult
 from cagefield.rendering.splats.splat_provenance import SplatSet
-from cagefield.selection.connected_points import with_detours
-from cagefield.typing import Array
 
 MAX_CACHED_PATCHES = 16
 """Maximum number of patches in memory."""
@@ -84,7 +82,7 @@ class Patcher:
         self._light_block: tuple[Key, GridBlock | SplatBlock] | None = None
         self._directional_models: dict[tuple[float, float, float] | None, LightModel] = {}
         self._composites: OrderedDict[Key, Pasted] = OrderedDict()
-        self._detours: OrderedDict[Key, ControlPoints] = OrderedDict()
+        self.detours = DetourCache(self._field)
         self._images: dict[Key, RenderResult] = {}
 
     def prepare(
@@ -114,39 +112,19 @@ class Patcher:
             for step in ready:
                 check_cancelled()
                 below = PreparedStack(prepared)
-                connected = self._connected(step, below)
+                connected = self.detours.prepared(step, below)
                 prepared.append(self._prepare(connected, below, stage, relight_continuous, preserve_opacity))
         while len(self._composites) > max(MAX_CACHED_PATCHES, len(prepared)):
             self._composites.popitem(last=False)
         return PreparedStack(prepared)
 
     def with_detours(self, edits: Sequence[Edit]) -> list[Edit]:
-        """The edits, in order, with the detours of connected control points, which exact maps need.
+        """The edits of a document, in its order, with the detours of connected control points, which exact
+        maps need.
 
         Raises `EditError` for a control point without matter within the radius.
         """
-        ready: list[Edit] = []
-        for edit in edits:
-            ready.append(self._connected(PreparedEdit(edit), PreparedStack(ready)).edit)
-        return ready
-
-    def _connected(self, step: PreparedEdit, below: PreparedStack) -> PreparedEdit:
-        """An edit with the detours of its connected control points, the latest of which are kept."""
-        points = step.edit.inner
-        if not isinstance(points, ControlPoints) or not points.is_unprepared:
-            return step
-        touching = (*below.steps,) if _meets(below.boxes, points.aabb) else ()
-        key: Key = (*touching, points)
-        if key not in self._detours:
-            edit = with_detours(step.edit, self._field, PreparedStack(touching))
-            if edit is step.edit:
-                return step
-            assert isinstance(edit.inner, ControlPoints)
-            self._detours[key] = edit.inner
-        self._detours.move_to_end(key)
-        while len(self._detours) > MAX_CACHED_PATCHES:
-            self._detours.popitem(last=False)
-        return replace(step, edit=step.edit.replace(inner=self._detours[key]))
+        return self.detours.in_stack(edits)
 
     def _prepare(
         self,
@@ -363,11 +341,6 @@ class Patcher:
         self._cache[key] = value
         while len(self._cache) > MAX_CACHED_PATCHES:
             self._cache.popitem(last=False)
-
-
-def _meets(boxes: Array, box: Array) -> bool:
-    """True where one of boxes [B,2,3] meets a box [2,3]."""
-    return bool(((boxes[:, 0] <= box[1]) & (box[0] <= boxes[:, 1])).all(axis=1).any())
 
 
 def needs_patch(edit: Edit, moving: bool = False, *, feathers: bool = True) -> bool:

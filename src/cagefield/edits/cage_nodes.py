@@ -117,8 +117,10 @@ def parse_cage(node: Node) -> Cage:
         raise node.error(str(error)) from None
 
 
-def parse_outer(node: Node, inner: Cage) -> Cage:
-    """An outer cage, or the one with a margin around an inner cage."""
+def parse_outer(node: Node, inner: Cage, folder: Path | None = None) -> Cage:
+    """An outer cage, or the one with a margin around an inner cage; a mesh's file as in `parse_inner`."""
+    if "mesh" in node.names():
+        return _mesh(node, folder)
     if "margin" not in node.names():
         return parse_cage(node)
     return inner.grown(node.mapping(required=("margin",))["margin"].factors())
@@ -188,6 +190,13 @@ def dump_margin(inner: Cage, outer: Cage) -> dict[str, Any] | None:
         if (m > 0.0).all() and inner.grown(m) == outer:
             return {"margin": float(m[0]) if (m == m[0]).all() else m.tolist()}
     return None
+
+
+def dump_outer(inner: Cage, outer: Cage) -> dict[str, Any]:
+    """The mapping that `parse_outer` reads."""
+    if isinstance(outer, MeshCage):
+        return _from_mesh(outer)
+    return dump_margin(inner, outer) or dump_cage(outer)
 
 
 def _short(v: Array, digits: int) -> Array:

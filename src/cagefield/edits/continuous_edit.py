@@ -22,6 +22,7 @@ from cagefield.edits.shells import SMOOTH_FLOW, ShellKind, ShellSettings
 from cagefield.errors import DeviceError
 from cagefield.geometry.cage import Cage
 from cagefield.geometry.control_points import ControlPoints
+from cagefield.geometry.mesh_cage import MeshCage
 from cagefield.geometry.reach_cage import ReachCage
 from cagefield.typing import Array, Float32, Mask
 from cagefield.warps import (
@@ -71,6 +72,12 @@ class ContinuousEdit(AbstractEdit):
                 "a continuous edit needs an outer cage; give one (inner.grown(margin), say) or make the"
                 " edit discrete"
             )
+        if isinstance(self.outer, MeshCage) and not isinstance(self.inner, MeshCage):
+            self._refuse(
+                "a mesh as outer cage holds a mesh alone; give MeshCage.of_box(inner), or a box as outer cage"
+            )
+        if self.is_graded and isinstance(self.outer, MeshCage):
+            self._refuse("a grade fades to the faces of a box; give a box as outer cage")
 
     @property
     def _reach(self) -> ReachCage | None:

@@ -135,7 +135,7 @@ class Continuous(ContinuousEdit, Edit):
 
     Parameters, besides those of `Edit`
     - outer: the outer cage V^o, which confines the edit. None for control points takes the box around all
-      that they reach on their way, a `ReachCage`.
+      that they reach on their way, a `ReachCage`. A `MeshCage` confines another mesh.
     - shell: kind of the map between the cages, `Flow` (cannot fold) or `Trilinear` (the paper's).
     - lattice: None evaluates the shell exactly at every sample; an integer R interpolates it from R^3 nodes
       (64, 128 or 256 in the paper). The inner region is exact either way.

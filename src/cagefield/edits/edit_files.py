@@ -69,7 +69,7 @@ from cagefield.edits import file_nodes
 from cagefield.edits.cage_nodes import (
     dump_cage,
     dump_inner,
-    dump_margin,
+    dump_outer,
     parse_cage,
     parse_inner,
     parse_outer,
@@ -213,7 +213,8 @@ def _edit(node: Node, check: bool, mend: bool, folder: Path | None) -> Edit:
         optional=_OPTIONAL_KEYS,
     )
     inner = parse_inner(keys["inner"], folder)
-    outer = None if "outer" not in keys or keys["outer"].is_null else parse_outer(keys["outer"], inner)
+    has_outer = "outer" in keys and not keys["outer"].is_null
+    outer = parse_outer(keys["outer"], inner, folder) if has_outer else None
     options: dict[str, Any] = {}
     if "fill" in keys:
         options["fill"] = _fill(keys["fill"])
@@ -351,7 +352,7 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
         content["source"] = edit.source
     content["inner"] = dump_inner(edit.inner)
     if settings.outer is not None and not settings.outer.follows_edit:
-        content["outer"] = dump_margin(edit.inner, settings.outer) or dump_cage(settings.outer)
+        content["outer"] = dump_outer(edit.inner, settings.outer)
     if edit.operations:
         content["operations"] = [dump_operation(operation) for operation in edit.operations]
     if not isinstance(edit, Delete | Paste):

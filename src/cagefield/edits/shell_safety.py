@@ -15,6 +15,7 @@ from cagefield.errors import CageError
 from cagefield.geometry.cage import Cage
 from cagefield.geometry.cage_checks import format_vector
 from cagefield.geometry.face_distance import outside_by
+from cagefield.geometry.mesh_cage import MeshCage
 from cagefield.warps import Shell
 
 _MAX_SEARCHED_OPERATIONS = 500
@@ -80,6 +81,13 @@ class ShellSafety:
         handles = deformed.handles
         has_corners = self.inner.is_hexahedron
         outside = np.flatnonzero(~self.outer.contains(handles))
+        if len(outside) and isinstance(self.outer, MeshCage):
+            k = int(outside[0])
+            return (
+                f"outer cage must contain the inner cage: {deformed.handle_noun} {k} at"
+                f" {format_vector(handles[k])} is outside of its mesh",
+                "; enlarge the outer cage",
+            )
         if len(outside):
             face, distance, k = max(
                 ((*outside_by(self.outer, handles[k]), int(k)) for k in outside),

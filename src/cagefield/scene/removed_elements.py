@@ -5,6 +5,9 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.splat_field import SplatField
@@ -14,6 +17,10 @@ from cagefield.files.safe_open import read_text
 from cagefield.scene.scene_files import REMOVED, check_part
 from cagefield.selection.element_selection import Selection
 from cagefield.selection.selection_files import dump_selection, parse_selection
+
+if TYPE_CHECKING:
+    from cagefield.selection.elements import Elements
+    from cagefield.typing import Mask
 
 VERSION = 1
 
@@ -38,6 +45,25 @@ def without_removed(field: VoxelField | SplatField, selection: Selection | None)
             f"the deleted elements are of a field of {selection.total} elements, this one has {len(elements)}"
         )
     return without_elements(field, elements, selection.mask)
+
+
+def removed_also(
+    before: Removal | None, field: VoxelField | SplatField, elements: Elements, mask: Mask
+) -> Removal:
+    """Removal of more elements: those True in `mask` [N], of the elements of `field`, from which the ones of
+    `before` are gone already."""
+    from cagefield.selection.field_elements import elements_of_field
+
+    if before is None:
+        return Removal(field, Selection.from_mask(mask))
+    whole, gone = elements_of_field(before.field), before.selection.mask.copy()
+    if elements.kind == "splats":
+        gone[np.flatnonzero(~gone)[mask]] = True
+    else:
+        numbers = np.full(whole.occupancy.shape, -1)
+        numbers[tuple(whole.cells.T)] = np.arange(len(whole))
+        gone[numbers[tuple(elements.cells[mask].T)]] = True
+    return Removal(before.field, Selection.from_mask(gone))
 
 
 def dump_removed(selection: Selection | None) -> str:

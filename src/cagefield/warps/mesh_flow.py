@@ -116,6 +116,10 @@ class MeshFlow:
     from a grid of nodes, one slice for each step, trilinear in z: so its slope has a bound, and a step of the
     implicit midpoint rule, which is its own inverse, is one to one where h |dv/dz| < 2 (see `LatticeFlow`).
 
+    A mesh as outer cage has the coordinates of its box. d_o is then the distance from its surface, less one
+    cell, and the velocity is 0 at nodes nearer than that: so it is in every cell that reaches outside, and
+    the flow is the identity there to the bit.
+
     Where the motion is affine it is so inside, to rounding: the grid holds an affine velocity exactly. Else
     the nodes next to a vertex are changed until its own velocity is interpolated there.
     """
@@ -184,9 +188,7 @@ class MeshFlow:
         places, rows, d_o = _nodes(self.outer, self.cells)
         B, b, vertices, residual = piece.chord(s, h)
         found = blend(places, vertices, self.triangles, residual)
-        edges = self.confines.frame * (2.0 / self.cells)
-        cell = max(np.linalg.norm(edges @ signs) for signs in ((1, 1, 1), (1, 1, -1), (1, -1, 1), (-1, 1, 1)))
-        d_i = (found[:, 3] - np.minimum(cell, 0.5 * d_o)).clip(0.0)
+        d_i = (found[:, 3] - np.minimum(cell_diagonal(self.outer, self.cells), 0.5 * d_o)).clip(0.0)
         a, linear, _ = falloff_numbers(self.falloff)
         w, _ = self.falloff.weight(d_i / d_o, (a, linear))
         v = w[:, None] * (places @ B.T + b + found[:, :3])
@@ -200,9 +202,23 @@ class MeshFlow:
         return grid
 
 
+def cell_diagonal(outer: Cage, cells: int) -> float:
+    """Longest diagonal of a cell of the grid, world units."""
+    edges = Extended.from_cage(outer).frame * (2.0 / cells)
+    signs = ((1, 1, 1), (1, 1, -1), (1, -1, 1), (-1, 1, 1))
+    return float(max(np.linalg.norm(edges @ np.array(each)) for each in signs))
+
+
+def distance_inside(mesh: MeshCage, places: Array) -> Array:
+    """Distances [N] of places [N,3] inside of a mesh from its surface; 0 outside."""
+    # With its triangles turned over, the inside is what lies outside.
+    turned = np.ascontiguousarray(mesh.triangles[:, ::-1])
+    return blend(places, mesh.vertices, turned, np.zeros_like(mesh.vertices))[:, 3]
+
+
 @lru_cache(maxsize=8)
 def _nodes(outer: Cage, cells: int) -> tuple[Array, NDArray[np.intp], Array]:
-    """(places [N,3], numbers [N], d_o [N]) of the grid's nodes inside of an outer cage.
+    """(places [N,3], numbers [N], d_o [N]) of the grid's nodes inside of an outer cage; see `MeshFlow`.
 
     Places are shifted by 1e-7 of the cage, so that none is on a face or an edge of a mesh of round numbers.
     """
@@ -211,4 +227,8 @@ def _nodes(outer: Cage, cells: int) -> tuple[Array, NDArray[np.intp], Array]:
     rows = np.flatnonzero(np.abs(z).max(axis=1) < 1.0 - 1e-9)
     d_o = outer_distance(confines, z[rows])
     places = confines.center + (z[rows] + 1e-7 * np.array([0.61, 0.83, 0.47])) @ confines.frame.T
+    if isinstance(outer, MeshCage):
+        d_o = distance_inside(outer, places) - cell_diagonal(outer, cells)
+        inside = np.flatnonzero(d_o > 0.0)
+        return places[inside], rows[inside], d_o[inside]
     return places, rows, d_o

@@ -14,7 +14,13 @@ from cagefield.warps.cage_maps import flow_between, inner_map_between
 from cagefield.warps.falloff import Falloff
 from cagefield.warps.free_form_nodes import flow_nodes
 from cagefield.warps.interfaces import InnerMap, NoInnerMap
-from cagefield.warps.mesh_flow import MeshFlow, MeshPiece, pieces_of_mesh
+from cagefield.warps.mesh_flow import (
+    MeshFlow,
+    MeshPiece,
+    cell_diagonal,
+    distance_inside,
+    pieces_of_mesh,
+)
 
 MIN_GAP = 0.02
 """Least gap between the mesh and the outer cage on the way, as a share of the outer cage's half-width."""
@@ -24,6 +30,12 @@ MIN_CELLS, MAX_CELLS = 20, 40
 
 CELLS_PER_GAP = 2.5
 """Cells, at least, between the mesh and the outer cage."""
+
+CELLS_PER_MESH_GAP = 5.0
+"""The same in a mesh as outer cage: one cell at its surface stands still, one at the inner mesh moves."""
+
+STILL_CELLS = 2.2
+"""Least distance of the inner mesh from a mesh as outer cage, in diagonals of a cell."""
 
 _WAY_TIMES: Array = np.linspace(0.0, 1.0, 9)
 
@@ -37,7 +49,8 @@ class MeshShell:
     go where they are moved; the space between follows their mean value coordinates as a velocity: coordinates
     that are negative, inside of a concave mesh, cannot fold it.
 
-    Parameters: the canonical and the deformed inner cage, the outer cage with parallel faces, the falloff.
+    Parameters: the canonical and the deformed inner cage, the outer cage, with parallel faces or a mesh, the
+    falloff.
     """
 
     inner: MeshCage
@@ -48,7 +61,8 @@ class MeshShell:
     @cached_property
     def flow(self) -> MeshFlow:
         """The flow, on a grid that the gap between the cages asks for."""
-        wanted = 2.0 * CELLS_PER_GAP / max(self._gap, 1e-6)
+        per_gap = CELLS_PER_MESH_GAP if isinstance(self.outer, MeshCage) else CELLS_PER_GAP
+        wanted = 2.0 * per_gap / max(self._gap, 1e-6)
         cells = int(np.clip(np.ceil(wanted), MIN_CELLS, MAX_CELLS))
         return MeshFlow(self.inner.triangles, self._pieces, self.outer, self.falloff, cells)
 
@@ -58,10 +72,24 @@ class MeshShell:
 
     @cached_property
     def _gap(self) -> float:
-        """Least 1 - |z| of the vertices on their way, negative outside of the outer cage."""
+        """Least 1 - |z| of the vertices on their way, negative outside of the outer cage.
+
+        In a mesh as outer cage, the least distance from it over half the longest edge of its box.
+        """
         confines = self._confines
         ways = [self.inner.vertices, *(x for piece in self._pieces for x in piece.at(_WAY_TIMES)[0])]
+        if isinstance(self.outer, MeshCage):
+            return self._room(self.outer, ways) / float(np.linalg.norm(confines[2], axis=0).max())
         return float(1.0 - max(np.abs((x - confines[0]) @ confines[1].T).max() for x in ways))
+
+    def _room(self, outer: MeshCage, ways: list[Array]) -> float:
+        """Least distance of the inner mesh on its way from a mesh as outer cage; 0 where it goes outside.
+
+        Taken at vertices, and at the middles of edges and triangles.
+        """
+        edges, triangles = self.inner.mesh_edges, self.inner.triangles
+        points = [np.concatenate([x, x[edges].mean(axis=1), x[triangles].mean(axis=1)]) for x in ways]
+        return float(distance_inside(outer, np.concatenate(points)).min())
 
     @cached_property
     def _confines(self) -> tuple[Array, Array, Array]:
@@ -118,6 +146,14 @@ class MeshShell:
                 f"has no room: the gap between the mesh and the outer cage on its way is {self._gap:.2g} of"
                 f" the outer cage's half-width and must be at least {MIN_GAP:g} on every side"
             )
+        if isinstance(self.outer, MeshCage):
+            half = float(np.linalg.norm(self._confines[2], axis=0).max())
+            room, least = self._gap * half, STILL_CELLS * cell_diagonal(self.outer, self.flow.cells)
+            if room < least:
+                return (
+                    f"has no room: the mesh comes to within {room:.2g} of the outer cage on its way, and must"
+                    f" stay {least:.2g} from it"
+                )
         if self._pieces and not self.flow.is_one_to_one:
             return "is strained too much: the mesh moves too far for its gap to the outer cage"
         return None

@@ -1,7 +1,7 @@
 /** The editor: its parts, connected to each other, to the server's messages and to the canvas. */
 import { Vector3 } from "three";
 import { cageOverlay, restCages, shownCages } from "../editing/cage_overlay";
-import { carrierRotation, carryPoint } from "../editing/carrier";
+import { carrierRotation, carryPoint, withCarriers } from "../editing/carrier";
 import { Drag, targetCage } from "../editing/drag";
 import { Gizmo } from "../editing/gizmo";
 import { Grid } from "../editing/grid";
@@ -21,6 +21,7 @@ import { Connection, socketAddress } from "../net/connection";
 import type {
   Answer,
   Ask,
+  Carried,
   EditState,
   Hello,
   Job,
@@ -252,6 +253,7 @@ export class App {
         break;
       case "dragged":
         if (this.drag?.takeAnswer(message)) this.viewport.invalidate();
+        if (this.drag?.id === message.drag && !this.drag.ended) this.takeCarriers(message.carried);
         if (this.drag && !this.drag.ended) this.store.set({ limit: this.drag.why });
         break;
       case "answer":
@@ -306,6 +308,14 @@ export class App {
       const hasPoints = selectedEdit(this.store.now)?.cage !== "box";
       this.store.set({ mode: hasPoints ? "edit" : "set", cage: "inner" });
     }
+  }
+
+  /** Moves the edits that the dragged one carries. */
+  private takeCarriers(carried: Carried[]): void {
+    const { state } = this.store.now;
+    if (state === null || carried.length === 0) return;
+    this.store.set({ state: withCarriers(state, carried) });
+    this.viewport.invalidate();
   }
 
   /** Shows the progress of a job, and downloads the finished file of a job that this page started. */

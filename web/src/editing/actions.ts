@@ -140,6 +140,19 @@ export class Actions {
     else this.app.say(`proportional editing is ${proportional ? "on: the wheel changes its radius" : "off"}`);
   }
 
+  /** Switches between distances through dense matter alone and straight ones, of the selected control points. */
+  toggleConnected(): void {
+    this.withSelected((edit) => {
+      if (edit.cage !== "points" || edit.points === null)
+        return this.app.say("connected only is for control points (Ctrl+double-click)", "warning");
+      const connected = !edit.points.connected;
+      this.app.send({ type: "point_reach", edit: edit.id, connected });
+      this.app.say(
+        `connected only is ${connected ? "on: the points reach through dense matter alone" : "off"}`,
+      );
+    });
+  }
+
   /** Makes an edit of a control point, on the surface in the middle of the view. */
   placePoint(): void {
     this.app.expectEdit();

@@ -6,7 +6,7 @@ import { Matrix3, Quaternion, Vector3 } from "three";
 import { orthogonalFactor, type Posed } from "./cage";
 import type { Cages } from "./drag";
 import type { Operation } from "./operations";
-import type { Corners, EditState, Vec3 } from "../net/protocol";
+import type { Carried, Corners, EditState, State, Vec3 } from "../net/protocol";
 
 /** A matrix [3,4], row by row; null for an edit that nothing carries. */
 export type Carrier = EditState["carrier"];
@@ -42,6 +42,16 @@ export function operationAtRest(carrier: Carrier, operation: Operation): Operati
   if (carrier === null || !("by" in operation) || operation.kind === "scale") return operation;
   const by = new Vector3(...operation.by).applyMatrix3(linearPart(carrier).invert()).toArray();
   return { ...operation, by: by.map((x) => Math.round(x * 1e9) / 1e9) as Vec3 };
+}
+
+/** The state with other carriers of some edits. */
+export function withCarriers(state: State, carried: readonly Carried[]): State {
+  const carriers = new Map(carried.map(({ edit, carrier }) => [edit, carrier]));
+  const edits = state.edits.map((edit) => {
+    const carrier = carriers.get(edit.id);
+    return carrier === undefined ? edit : { ...edit, carrier };
+  });
+  return { ...state, edits };
 }
 
 function carryCage(carrier: Carrier, cage: Posed): Posed {

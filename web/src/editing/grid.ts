@@ -32,8 +32,18 @@ export class Grid {
       this.edit = edit.id;
       this.lines = [];
     }
-    const { inner, shell, falloff, width } = edit;
-    const key = JSON.stringify([edit.id, handlesOf(deformed), outer.corners, inner, shell, falloff, width]);
+    const { inner, shell, falloff, width, points } = edit;
+    const reach = [points?.radius, points?.falloff, points?.connected];
+    const key = JSON.stringify([
+      edit.id,
+      handlesOf(deformed),
+      outer.corners,
+      inner,
+      shell,
+      falloff,
+      width,
+      reach,
+    ]);
     if (key !== this.requestKey && !this.isWaiting) {
       this.requestKey = key;
       this.isWaiting = true;

@@ -57,6 +57,12 @@ export function bindings(
       run: () => actions.toggleProportional(true),
     },
     {
+      group: "Cages",
+      keys: ["Alt+O"],
+      action: "Connected only: control points reach through dense matter alone",
+      run: () => actions.toggleConnected(),
+    },
+    {
       group: "Selection",
       keys: ["M"],
       action: "Brush: paint over elements; [ and ] change its size",

@@ -460,13 +460,15 @@ export interface PlayEnd {
   play: number;
 }
 /**
- * Reach of an edit's control points, world units, and the curve by which it fades; omitted ones stay.
+ * Reach of an edit's control points, world units, the curve by which it fades, and whether distances go
+ * through dense matter alone; omitted ones stay.
  */
 export interface PointReach {
   type: "point_reach";
   edit: number;
   radius?: number | null;
   falloff?: ("smooth" | "sphere" | "root" | "sharp" | "linear") | null;
+  connected?: boolean | null;
 }
 /**
  * The page has shown an image, or its edits; until then the server sends at most one more.
@@ -633,6 +635,13 @@ export interface HistogramCounts {
   selected: number[];
 }
 /**
+ * Map of an edit's cages to where its parents carry them during a drag; see `EditState.carrier`.
+ */
+export interface Carried {
+  edit: number;
+  carrier: number[] | null;
+}
+/**
  * Result of a `drag`: `part` of the operation was followed; `why` where `part` is below 1.
  */
 export interface Dragged {
@@ -646,6 +655,7 @@ export interface Dragged {
   outer: Corners | null;
   points: Vec3[];
   deformed_points: Vec3[];
+  carried: Carried[];
 }
 /**
  * One edit as pages show it; corners in world units, deformed: the inner cage after its operations.
@@ -691,6 +701,7 @@ export interface PointsState {
   interpolation: ("linear" | "bspline") | null;
   radius: number | null;
   falloff: ("smooth" | "sphere" | "root" | "sharp" | "linear") | null;
+  connected: boolean;
 }
 /**
  * First message, with the edited scene. `page` identifies this page among the open ones.

@@ -27,6 +27,7 @@ export function pointOptions(app: App, actions: Actions, pane: Pane): PointOptio
     curve: "smooth",
     radius: 0.1,
     falloff: "smooth",
+    connected: false,
     axis: "z",
     fixed: "start",
     degrees: 30,
@@ -81,6 +82,10 @@ export function pointOptions(app: App, actions: Actions, pane: Pane): PointOptio
     if (shown?.points?.falloff && value !== shown.points.falloff)
       app.send({ type: "point_reach", edit: shown.id, falloff: value as Curve });
   });
+  reach.addBinding(model, "connected", { label: "Connected only" }).on("change", ({ value }) => {
+    if (shown?.points && value !== shown.points.connected)
+      app.send({ type: "point_reach", edit: shown.id, connected: value });
+  });
 
   return {
     show(edit) {
@@ -91,7 +96,11 @@ export function pointOptions(app: App, actions: Actions, pane: Pane): PointOptio
       reach.hidden = edit.cage !== "points";
       model.curve = app.store.now.curve;
       if (points?.radius != null && points.falloff !== null)
-        Object.assign(model, { radius: points.radius, falloff: points.falloff });
+        Object.assign(model, {
+          radius: points.radius,
+          falloff: points.falloff,
+          connected: points.connected,
+        });
     },
   };
 }

@@ -17,7 +17,7 @@ matters little, as trained splats are nearly opaque: nine tenths of a digger's l
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -203,6 +203,16 @@ class ChangedSplats:
     jacobian: Array
     gains: Float32 | None = None
     colors: Float32 | None = None
+
+    def of_whole(self, removed: Mask) -> ChangedSplats:
+        """The difference to a whole field, whose splats True in `removed` [N] were left out: hidden ones."""
+        kept = np.flatnonzero(~removed)
+        hidden = removed.copy()
+        hidden[kept] = self.hidden
+        # Rows of children follow those of the field.
+        on_field = self.rows < len(kept)
+        rows = np.where(on_field, kept[np.minimum(self.rows, len(kept) - 1)], self.rows + removed.sum())
+        return replace(self, hidden=hidden, sources=kept[self.sources], rows=rows)
 
 
 def changed_splats(

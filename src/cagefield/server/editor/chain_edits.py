@@ -60,6 +60,14 @@ def children(document: Document, parent: Entry) -> tuple[Entry, ...]:
     return tuple(entry for entry in document.entries if name and entry.edit.parent == name)
 
 
+def descendants(document: Document, parent: Entry) -> tuple[Entry, ...]:
+    """The entries that an entry's edit carries, and those that they carry, and so on."""
+    found = [parent]
+    for entry in found:
+        found += children(document, entry)
+    return tuple(found[1:])
+
+
 def with_own_names(edits: Sequence[Edit], document: Document) -> tuple[Edit, ...]:
     """Edits that join a document, chains among them under names that no edit of the document has.
 
@@ -87,9 +95,11 @@ def with_own_names(edits: Sequence[Edit], document: Document) -> tuple[Edit, ...
 class Carriers:
     """Affine maps [3,4] by which parents carry cages, remembered while the edits are the same."""
 
-    def __init__(self, problem: Callable[[Edit], str | None]) -> None:
-        """`problem` says why an edit is not shown, or None."""
-        self._problem = problem
+    def __init__(
+        self, problem: Callable[[Edit], str | None], resolved: Callable[[Edit], Edit] = lambda edit: edit
+    ) -> None:
+        """`problem` says why an edit is not shown, or None; `resolved` gives it its detours, where known."""
+        self._problem, self._resolved = problem, resolved
         self._known: dict[int, tuple[tuple[Edit, ...], Array | None]] = {}
 
     def carrier(self, document: Document, entry: Entry) -> Array | None:
@@ -103,11 +113,11 @@ class Carriers:
         edits = [each.edit for each in document.entries]
         chain = tuple(edits[n] for n in ancestors(edits, document.place(entry.id)))
         shown = tuple(
-            edit.without_parent
+            self._resolved(edit.without_parent)
             for edit in chain
             if edit.enabled and edit.changes_anything and self._problem(edit) is None
         )
-        key = (entry.edit, *chain)
+        key = (entry.edit, *chain, *shown)
         known = self._known.get(entry.id)
         if known is not None and len(known[0]) == len(key) and all(map(_is, known[0], key)):
             return known[1]

@@ -83,12 +83,14 @@ def edit_of_mesh(cage: MeshCage, *, name: str, lattice: int) -> Edit:
     return Edit.continuous(cage, cage.grown(margin), name=name, lattice=lattice)
 
 
-def with_reach(edit: Edit, radius: float | None, falloff: str | None) -> Edit:
-    """The edit with another radius, world units, or falloff of its control points; None leaves either.
+def with_reach(edit: Edit, radius: float | None, falloff: str | None, connected: bool | None = None) -> Edit:
+    """The edit with another radius, world units, falloff or kind of distance of its control points.
+
+    None leaves each; `connected` points reach through dense matter alone.
 
     Raises `EditError` for an edit without control points of its own.
     """
     points = edit.inner
     if not isinstance(points, ControlPoints):
         raise edit.error("only control points have a radius; change the cage instead")
-    return edit.replace(inner=points.with_reach(radius=radius, falloff=falloff))
+    return edit.replace(inner=points.with_reach(radius=radius, falloff=falloff, connected=connected))

@@ -7,7 +7,7 @@ changes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import PurePath
 
@@ -19,12 +19,21 @@ from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
+from cagefield.geometry.detour_grid import DetourGrid
 from cagefield.geometry.mesh_cage import MeshCage
 from cagefield.selection.element_selection import Mode, Selection
 from cagefield.selection.selection_cages import outer_cage_of_shape
 from cagefield.server.editor.active_drags import Drags
 from cagefield.server.editor.cage_placement import cage_pair_around, outer_cage_around
-from cagefield.server.editor.chain_edits import Carriers, renamed, with_own_names, with_parent, without
+from cagefield.server.editor.chain_edits import (
+    Carriers,
+    descendants,
+    renamed,
+    with_own_names,
+    with_parent,
+    without,
+)
+from cagefield.server.editor.connected_edits import ConnectedEdits, Wanted, is_unprepared
 from cagefield.server.editor.document import Document, Entry
 from cagefield.server.editor.drag_solver import Moved, Target, move
 from cagefield.server.editor.edit_kinds import Kind, with_kind, with_options, with_outer, with_shell
@@ -74,7 +83,8 @@ class Session:
         self._saved: Document | None = document
         self._next = max((entry.id for entry in document.entries), default=0) + 1
         self._problems: IdentityCache[Edit, str | None] = IdentityCache(4 * MAX_EDITS)
-        self._carriers = Carriers(self.problem)
+        self._connected = ConnectedEdits()
+        self._carriers = Carriers(self.problem, self._connected.resolved)
 
     # ---- what is there ----
 
@@ -100,6 +110,13 @@ class Session:
 
     def problem(self, edit: Edit) -> str | None:
         """Why an edit cannot be shown, or None; remembered for the edits that were asked about last."""
+        found = self._problem(edit)
+        resolved = self._connected.resolved(edit)
+        if found is None and resolved is not edit:
+            return self._problem(resolved)
+        return found or self._connected.problem(edit)
+
+    def _problem(self, edit: Edit) -> str | None:
         if edit in self._problems:
             return self._problems[edit]
         found = problem(edit) if edit.changes_anything else None
@@ -112,7 +129,10 @@ class Session:
         """
         if self.preview is not None:
             return self.preview.edits
-        edits = (entry.edit for entry in self.shown.applied)
+        return self._drawn(self.shown.applied)
+
+    def _drawn(self, entries: Iterable[Entry]) -> tuple[Edit, ...]:
+        edits = (entry.edit for entry in entries)
         return tuple(
             edit.without_parent
             for edit in edits
@@ -122,6 +142,30 @@ class Session:
     def carrier(self, entry: Entry) -> Array | None:
         """Affine map [3,4] by which the parents of a shown entry carry its cages; None without any."""
         return self._carriers.carrier(self.shown, entry)
+
+    def carriers_of(self, page: int) -> dict[int, Array | None]:
+        """The affine map [3,4] of every entry that the one that a page drags carries, by number; None where
+        it stays."""
+        dragged = self.drags.dragged(page)
+        if dragged is None:
+            return {}
+        shown = self.shown
+        return {entry.id: self._carriers.carrier(shown, entry) for entry in descendants(shown, dragged)}
+
+    def detours_wanted(self) -> Wanted | None:
+        """Connected control points whose detours pages and pictures need and the session does not know."""
+        applied, removed = self.shown.applied, self.shown.removed
+        edits = [
+            (entry.edit, self._drawn(applied[:at]))
+            for at, entry in enumerate(applied)
+            if entry.edit.enabled and is_unprepared(entry.edit)
+        ]
+        return self._connected.wanted(edits, removed)
+
+    def detours_found(self, wanted: Wanted, found: DetourGrid | str) -> None:
+        """Detours that were wanted, or why there are none, which is then the edit's problem."""
+        self._connected.put(wanted, found)
+        self.revision += 1
 
     def below(self, number: int) -> tuple[Edit, ...]:
         """Drawn edits before edit `number`, which define the space of its inner cage."""
@@ -246,10 +290,12 @@ class Session:
         edit = subdivided(entry.edit, cells, interpolation)
         self._put(f"Subdivide{suffix_for(entry)}", replace(entry, edit=edit))
 
-    def point_reach(self, number: int, radius: float | None, falloff: str | None) -> None:
-        """The radius and the falloff of control points; None leaves either."""
+    def point_reach(
+        self, number: int, radius: float | None, falloff: str | None, connected: bool | None = None
+    ) -> None:
+        """The radius, the falloff and the kind of distance of control points; None leaves each."""
         entry = self._unlocked(number)
-        edit = with_reach(entry.edit, radius, falloff)
+        edit = with_reach(entry.edit, radius, falloff, connected)
         if edit != entry.edit:
             self._put(f"Reach{suffix_for(entry)}", replace(entry, edit=edit))
 

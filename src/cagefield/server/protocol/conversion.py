@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from types import MappingProxyType
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -124,6 +125,7 @@ def points_state(edit: Edit) -> server_messages.PointsState | None:
         interpolation=None if lattice is None else cast(Any, lattice.interpolation),
         radius=None if on_their_own is None else on_their_own.radius,
         falloff=None if on_their_own is None else cast(Any, on_their_own.falloff),
+        connected=on_their_own is not None and on_their_own.connected,
     )
 
 
@@ -173,9 +175,14 @@ def edit_state(
         operations=[f"{operation.noun} {operation}" for operation in edit.operations],
         grade=common.GradeValues(**asdict(edit.grading)),
         parent=parent,
-        carrier=None if carrier is None else cast(Any, tuple(carrier.reshape(-1).tolist())),
+        carrier=_affine(carrier),
         problem=problem,
     )
+
+
+def _affine(carrier: Array | None) -> Any:
+    """A map [3,4] as a message has it."""
+    return None if carrier is None else tuple(carrier.reshape(-1).tolist())
 
 
 def state_of(
@@ -226,8 +233,10 @@ def _count_of(selection: Selection | None) -> server_messages.SelectionCount | N
     return server_messages.SelectionCount(count=selection.count, total=selection.total)
 
 
-def dragged_of(drag: int, seq: int, moved: Moved) -> server_messages.Dragged:
-    """Message with the result of a drag."""
+def dragged_of(
+    drag: int, seq: int, moved: Moved, carriers: Mapping[int, Array | None] = MappingProxyType({})
+) -> server_messages.Dragged:
+    """Message with the result of a drag, and the maps [3,4] of the edits that the dragged one carries."""
     edit, outer = moved.edit, moved.edit.shell_settings.outer
     return server_messages.Dragged(
         drag=drag,
@@ -239,6 +248,10 @@ def dragged_of(drag: int, seq: int, moved: Moved) -> server_messages.Dragged:
         outer=None if outer is None else corners(outer),
         points=points_of(edit.inner),
         deformed_points=points_of(edit.deformed),
+        carried=[
+            server_messages.Carried(edit=number, carrier=_affine(carrier))
+            for number, carrier in carriers.items()
+        ],
     )
 
 

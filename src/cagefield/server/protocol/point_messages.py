@@ -39,12 +39,15 @@ class Subdivide(Message):
 
 
 class PointReach(Message):
-    """Reach of an edit's control points, world units, and the curve by which it fades; omitted ones stay."""
+    """Reach of an edit's control points, world units, the curve by which it fades, and whether distances go
+    through dense matter alone; omitted ones stay.
+    """
 
     type: Literal["point_reach"] = "point_reach"
     edit: EditId
     radius: Reach | None = None
     falloff: CurveName | None = None
+    connected: bool | None = None
 
 
 class PlaceMesh(Message):

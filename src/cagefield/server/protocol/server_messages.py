@@ -65,6 +65,8 @@ class PointsState(Message):
     radius: float | None
     """Reach of points on their own, before scaling."""
     falloff: CurveName | None
+    connected: bool
+    """True of points on their own that reach through dense matter alone."""
 
 
 class EditState(Message):
@@ -148,6 +150,13 @@ class State(Message):
         return self.type
 
 
+class Carried(Message):
+    """Map of an edit's cages to where its parents carry them during a drag; see `EditState.carrier`."""
+
+    edit: EditId
+    carrier: Affine | None
+
+
 class Dragged(Message):
     """Result of a `drag`: `part` of the operation was followed; `why` where `part` is below 1."""
 
@@ -162,6 +171,8 @@ class Dragged(Message):
     points: list[Vec3]
     """Control points of the inner cage, where it has them."""
     deformed_points: list[Vec3]
+    carried: list[Carried]
+    """The edits that the dragged one carries."""
 
     def redundancy_key(self) -> str:
         return self.type

@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from cagefield.edits import Continuous, Edit
 from cagefield.errors import CagefieldError
+from cagefield.server.editor.connected_edits import Wanted
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
@@ -20,15 +21,18 @@ from cagefield.server.render_queue.jobs import Job
 from cagefield.server.render_queue.splat_downloads import Exports
 from cagefield.server.render_worker.tasks import (
     Answered,
+    DetoursTask,
     EditValues,
     EndJobTask,
     ErrorTask,
     Failed,
     LightTask,
     Result,
+    Shown,
     Stopped,
     WarmStage,
     WarmTask,
+    values_of,
 )
 
 Errors = tuple[float, float]
@@ -43,10 +47,13 @@ class BackgroundWork:
         store: SceneStore,
         measured: Callable[[], None],
         tell: Callable[[server_messages.ServerMessage], None],
+        connected: Callable[[], None] = lambda: None,
     ) -> None:
-        """`measured` is called when a lattice was, `tell` with jobs' progress for all pages."""
+        """`measured` is called when a lattice was, `tell` with jobs' progress for all pages, `connected` when
+        detours of control points are known.
+        """
         self._session, self._store = session, store
-        self._measured, self._tell = measured, tell
+        self._measured, self._connected, self._tell = measured, connected, tell
         self._warmed = 0
         self.warming = list(WarmStage)
         self.light_known = False
@@ -61,14 +68,17 @@ class BackgroundWork:
 
         `expects_edits` where an edit may follow and there is time to find the light for it.
         """
+        wanted = None if self._session.moving else self._session.detours_wanted()
+        if wanted is not None:
+            return self._detours(wanted, generation)
         if self.warming:
             return self._warm()
         needs_light = any(edit.relight != "none" for edit in self._session.drawn())
         if not self.light_known and (needs_light or expects_edits):
             return BackgroundTask(lambda number: LightTask(number, generation), self._light_done)
-        edit = self._unmeasured()
-        if edit is not None:
-            return self._measure(edit, generation)
+        measured = self._unmeasured()
+        if measured is not None:
+            return self._measure(*measured, generation)
         if self._ending:
             return self._finish(*self._ending[0])
         return self._picture(generation) if self._jobs else None
@@ -92,6 +102,22 @@ class BackgroundWork:
         """A field whose light cannot be found says so where an edit needs it."""
         self.light_known = self.light_known or not isinstance(result, Stopped)
 
+    # ---- connected control points ----
+
+    def _detours(self, wanted: Wanted, generation: int) -> BackgroundTask:
+        below = Shown(values_of(wanted.below), removed=wanted.removed)
+
+        def done(result: Result) -> None:
+            if isinstance(result, Answered):
+                self._session.detours_found(wanted, result.value)
+            elif isinstance(result, Failed):
+                self._session.detours_found(wanted, result.text)
+            else:
+                return
+            self._connected()
+
+        return BackgroundTask(lambda task: DetoursTask(task, wanted.points, below, generation), done)
+
     # ---- lattices ----
 
     def errors(self) -> dict[int, Errors]:
@@ -103,15 +129,19 @@ class BackgroundWork:
                 found[entry.id] = error
         return found
 
-    def _unmeasured(self) -> Edit | None:
+    def _unmeasured(self) -> tuple[Edit, tuple[Edit, ...]] | None:
+        """An edit whose lattice is to be measured, and those below it."""
         if self._session.moving:
             return None
-        shown = (edit for edit in self._session.drawn() if isinstance(edit, Continuous))
-        edits = (edit for edit in shown if edit.kernel_lattice)
-        return next((edit for edit in edits if edit not in self._errors), None)
+        drawn = self._session.drawn()
+        for number, edit in enumerate(drawn):
+            if isinstance(edit, Continuous) and edit.kernel_lattice and edit not in self._errors:
+                return edit, drawn[:number]
+        return None
 
-    def _measure(self, edit: Edit, generation: int) -> BackgroundTask:
+    def _measure(self, edit: Edit, below: tuple[Edit, ...], generation: int) -> BackgroundTask:
         values = EditValues.from_edit(edit)
+        shown = Shown(values_of(below), removed=self._session.shown.removed)
 
         def done(result: Result) -> None:
             if isinstance(result, Stopped):
@@ -121,7 +151,7 @@ class BackgroundWork:
             if error is not None:
                 self._measured()
 
-        return BackgroundTask(lambda number: ErrorTask(number, values, generation), done)
+        return BackgroundTask(lambda number: ErrorTask(number, values, generation, shown), done)
 
     # ---- jobs ----
 

@@ -86,7 +86,7 @@ class Coordinator:
         worker = self.dispatcher.worker
         worker.files, worker.write_opened = store.files, store.write_opened
         worker.background = store.scene.background
-        self.background = BackgroundWork(session, store, self._measured, self.broadcast)
+        self.background = BackgroundWork(session, store, self._measured, self.broadcast, self.changed)
         self.highlights = Highlights(session, self._numbered_shown, self._send_highlight)
         self.greeting: str | None = None
         """A line for the pages that come."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from typing import cast
 
 from cagefield.edits import Edit, Paste
 from cagefield.errors import CagefieldError
@@ -30,7 +31,7 @@ KEPT_OCCUPANCIES = 6
 
 NOT_DRAWN = "pages draw voxels and splats alone; the server draws this scene"
 
-REMOVED = "elements are deleted; the server draws the others"
+REMOVED = "cells are deleted; the server draws the others"
 
 ISOLATED = "elements are isolated; the server draws them"
 
@@ -59,8 +60,6 @@ class PageFiles:
         """The edits' file, or the part of it that the page has not. Raises EditError, CagefieldError."""
         if task.shown.isolated is not None:
             raise CagefieldError(ISOLATED)
-        if task.shown.removed is not None:
-            raise CagefieldError(REMOVED)
         began = time.perf_counter()
         edits = self._renderers.edits(task.shown.edits)
         self._for_page.keep_only(self._renderers.known_edits)
@@ -68,6 +67,8 @@ class PageFiles:
         field = self._renderers.scene.rendered_field
         if isinstance(field, SplatSet):
             return self._splat_edits(field, edits, task, stop)
+        if task.shown.removed is not None:
+            raise CagefieldError(REMOVED)
         drawn = [self._prepared(edit) for edit in edits]
         same = all(one is other for one, other in zip(edits, drawn, strict=True))
         renderers = self._renderers.edited if same else self._own
@@ -94,15 +95,20 @@ class PageFiles:
     def _splat_edits(
         self, splats: SplatSet, shown: Sequence[Edit], task: PageEditsTask, stop: Stop
     ) -> EditsDone | Stopped:
-        """All that edits change of splats, whatever the page has; none is split while something moves.
+        """All that edits change of splats, whatever the page has; deleted ones are hidden.
+
+        None is split while something moves.
 
         Raises CagefieldError for pastes, whose colours a page that has loaded its splats does not have.
         """
         if any(isinstance(edit, Paste) for edit in shown):
             raise CagefieldError("the server draws what is pasted between scenes of splats")
-        began, proceed = time.perf_counter(), cancellation_check(stop)
+        began, proceed, whole = time.perf_counter(), cancellation_check(stop), splats.field
         try:
-            patcher = self._renderers.scene.patcher
+            scene, removed = self._renderers.shown_scene(task.shown), task.shown.removed
+            patcher = scene.patcher
+            if removed is not None:
+                splats = cast(SplatSet, scene.rendered_field)
             edits = patcher.prepare(shown, stage=PATCH_STAGES[task.refinement], proceed=proceed)
             is_coarse = task.refinement.is_coarse
             changed = changed_splats(
@@ -116,7 +122,9 @@ class PageFiles:
         except GivenUpError:
             return Stopped(task.number)
         mapped = time.perf_counter()
-        content = encode_page_splat_edits(splats.field, changed)
+        if removed is not None:
+            changed = changed.of_whole(removed.mask)
+        content = encode_page_splat_edits(whole, changed)
         attained = attained_refinement(task.refinement, shown, patcher)
         return EditsDone(task.number, content, (), attained, mapped - began, time.perf_counter() - mapped)
 

@@ -96,7 +96,7 @@ class SelectionHandlers:
         self, shown: Shown, rows: np.ndarray[Any, Any], proceed: Callable[[], None] | None = None
     ) -> DeformedPositions:
         """Deformed positions of some elements, by the elements' numbers."""
-        patcher = self._renderers.scene.patcher
+        patcher = self._renderers.shown_scene(shown).patcher
         edits = EditStack(patcher.with_detours(self._renderers.edits(shown.edits)))
         found = deformed_positions(self._elements.positions[rows], edits, coarse=True, proceed=proceed)
         return DeformedPositions(found.points, rows[found.element])

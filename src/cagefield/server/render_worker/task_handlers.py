@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 
 from cagefield.completion.patcher import PatchStage
-from cagefield.edits import Continuous, EditMap
+from cagefield.compute.cancellation import cancellable
+from cagefield.edits import Continuous, Edit, EditMap
+from cagefield.errors import EditError
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.control_points import ControlPoints
 from cagefield.rendering.splats.raster_splats import deformed_splats
 from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.server.editor.cage_placement import probes
@@ -25,6 +28,7 @@ from cagefield.server.render_worker.splat_density import dense_cells
 from cagefield.server.render_worker.tasks import (
     Answered,
     BoxTask,
+    DetoursTask,
     EndJobTask,
     ErrorTask,
     FitTask,
@@ -77,6 +81,8 @@ class TaskHandlers:
             return self._light(task, lambda: abandoned(task.generation))
         if isinstance(task, ErrorTask):
             return self._error(task, lambda: abandoned(task.generation))
+        if isinstance(task, DetoursTask):
+            return self._detours(task, lambda: abandoned(task.generation))
         if isinstance(task, StillTask):
             return self._still(task, lambda: abandoned(task.generation))
         if isinstance(task, HighlightTask):
@@ -105,7 +111,7 @@ class TaskHandlers:
             return self._files.end(task.job, task.keep)
         if isinstance(task, PageFieldTask):
             return self._pages.field()
-        return grid_lines(task.edit.edit())
+        return grid_lines(self._connected(task))
 
     def _highlight(self, task: HighlightTask, stop: Callable[[], bool]) -> Result:
         try:
@@ -125,7 +131,7 @@ class TaskHandlers:
         if isinstance(self._renderers.scene.field, SplatField):
             return Answered(task.number, (0.0, 0.0))
         try:
-            (edit,) = self._renderers.scene.patcher.with_detours(self._renderers.edits((task.edit,)))
+            edit = self._connected(task)
             if not isinstance(edit, Continuous):
                 return Answered(task.number, (0.0, 0.0))
             most, mean = edit.lattice_error(samples=SAMPLES, proceed=cancellation_check(stop))
@@ -133,6 +139,32 @@ class TaskHandlers:
             return Stopped(task.number)
         voxel = self._renderers.scene.field.sample_spacing
         return Answered(task.number, (most / voxel, mean / voxel))
+
+    def _connected(self, task: ErrorTask | GridTask) -> Edit:
+        """The task's edit, with the detours of its control points where they are connected."""
+        *below, edit = self._renderers.edits((*task.below.edits, task.edit))
+        points = edit.inner
+        if not (isinstance(points, ControlPoints) and points.is_unprepared):
+            return edit
+        return self._renderers.shown_scene(task.below).patcher.with_detours([*below, edit])[-1]
+
+    def _detours(self, task: DetoursTask, stop: Callable[[], bool]) -> Result:
+        """Detours of the points; the reason as text where a point is connected to nothing."""
+        patcher = self._renderers.shown_scene(task.below).patcher
+        proceed = cancellation_check(stop)
+        try:
+            below = patcher.prepare(
+                self._renderers.edits(task.below.edits),
+                stage=PatchStage.CACHED,
+                preserve_opacity=task.below.preserve_opacity,
+                proceed=proceed,
+            )
+            with cancellable(proceed):
+                return Answered(task.number, patcher.detours.of_points(task.points, below))
+        except GivenUpError:
+            return Stopped(task.number)
+        except EditError as error:
+            return Answered(task.number, str(error))
 
     def _frame(self, task: FrameTask, stop: Callable[[], bool]) -> Result:
         """Whether the picture was added; False where those before it are gone."""

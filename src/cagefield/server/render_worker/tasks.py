@@ -11,6 +11,7 @@ from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Still
 from cagefield.edits import Edit
 from cagefield.geometry.cage import Cage
+from cagefield.geometry.control_points import ControlPoints
 from cagefield.selection.element_selection import Selection
 from cagefield.selection.elements import Attribute
 from cagefield.selection.selection_cages import CageShape
@@ -140,19 +141,37 @@ class LightTask:
 
 @dataclass(frozen=True)
 class ErrorTask:
-    """How far an edit's lattice is from its exact map; given up when its generation is over."""
+    """How far an edit's lattice is from its exact map; given up when its generation is over.
+
+    Connected control points are those on the field under the edits `below`.
+    """
 
     number: int
     edit: EditValues
     generation: int
+    below: Shown = Shown(())
 
 
 @dataclass(frozen=True)
 class GridTask:
-    """Lines of a regular grid through an edit's shell, as the edit bends them."""
+    """Lines of a regular grid through an edit's shell, as the edit bends them; `below` as in `ErrorTask`."""
 
     number: int
     edit: EditValues
+    below: Shown = Shown(())
+
+
+@dataclass(frozen=True)
+class DetoursTask:
+    """Detours of connected control points on the field under the edits `below` (`geometry.detour_grid`).
+
+    Abandoned once the shared generation is past `generation`.
+    """
+
+    number: int
+    points: ControlPoints
+    below: Shown
+    generation: int
 
 
 @dataclass(frozen=True)
@@ -253,6 +272,7 @@ Task: TypeAlias = (
     | LightTask
     | ErrorTask
     | GridTask
+    | DetoursTask
     | FrameTask
     | EndJobTask
     | PageFieldTask

@@ -159,8 +159,9 @@ class MessageHandlers:
         edit = self._session.shown.entry(number).edit
         if not isinstance(edit, Continuous) or self._session.problem(edit) is not None:
             return []
-        values = EditValues.from_edit(edit)
-        return await self._coordinator.ask(lambda task: GridTask(task, values))
+        values, removed = EditValues.from_edit(edit), self._session.shown.removed
+        below = Shown(values_of(self._session.below(number)), removed=removed)
+        return await self._coordinator.ask(lambda task: GridTask(task, values, below))
 
     async def _surface(self, x: float, y: float) -> Any:
         camera = self._page.camera
@@ -181,7 +182,8 @@ class MessageHandlers:
     def _drag(self, message: client_messages.DragMove) -> None:
         moved = self._session.drag(self._page.number, message.drag, operation_of(message.operation))
         self._page.seq = message.seq
-        self._page.send_queue.put(dragged_of(message.drag, message.seq, moved))
+        carriers = self._session.carriers_of(self._page.number)
+        self._page.send_queue.put(dragged_of(message.drag, message.seq, moved, carriers))
         self._coordinator.changed(but=self._page)
 
     @_handles(client_messages.DragEnd)

@@ -23,4 +23,4 @@ async def change_points(session: Session, page: Page, message: PointChange) -> N
     elif isinstance(message, Subdivide):
         session.subdivide(message.edit, message.cells, message.interpolation)
     else:
-        session.point_reach(message.edit, message.radius, message.falloff)
+        session.point_reach(message.edit, message.radius, message.falloff, message.connected)

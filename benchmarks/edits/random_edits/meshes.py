@@ -1,4 +1,4 @@
-"""Random mesh cages and edits of them, for property tests."""
+"""Random mesh cages and edits of them."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ def random_mesh(rng: np.random.Generator, kind: str) -> MeshCage:
         v *= (1.0 - 0.45 * np.cos(3.0 * np.arctan2(v[:, 1], v[:, 0])) ** 2)[:, None]
     cage = MeshCage(v, t)
     moved = cage.rotate(rng.normal(0.0, 1.0, 3)).translate(rng.uniform(-0.1, 0.1, 3))
+    assert isinstance(moved, MeshCage)
     return MeshCage(moved.vertices, moved.triangles)
 
 

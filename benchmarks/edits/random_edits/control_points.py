@@ -1,4 +1,4 @@
-"""Random edits of control points, for tests."""
+"""Random edits of control points, plain and connected."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import numpy as np
 
 from cagefield.edits import Continuous, Edit
 from cagefield.geometry.cage import Cage
+from cagefield.geometry.control_points import ControlPoints
+from cagefield.geometry.detour_grid import DetourGrid
 from cagefield.geometry.point_deformers import FALLOFF_CURVES
 from cagefield.typing import Array
 
@@ -41,3 +43,23 @@ def points_around(edit: Continuous, count: int, seed: int) -> Array:
     handles = edit.deformed.handles
     near = handles[rng.integers(0, len(handles), count // 2)] + rng.normal(0.0, 0.3, (count // 2, 3))
     return np.concatenate([spread, near])
+
+
+def grid_around(points: ControlPoints, seed: int, edge: float = 0.25) -> DetourGrid:
+    """Random detours in [0, r], 0 at the control points, smooth over some nodes."""
+    y = points.local_points
+    low, high = y.min(axis=0) - points.radius, y.max(axis=0) + points.radius
+    shape = np.ceil((high - low) / edge).astype(int) + 3
+    values = np.random.default_rng(seed).uniform(-0.5, 1.0, shape).clip(0.0) * points.radius
+    base = np.floor((y - low) / edge + 0.5).astype(int)
+    for i, j, k in base:
+        values[i - 1 : i + 2, j - 1 : j + 2, k - 1 : k + 2] = 0.0
+    return DetourGrid(low, edge, values)
+
+
+def connected_edit(seed: int) -> Continuous:
+    """`random_edit` of connected points, over random detours."""
+    edit = random_edit(seed)
+    assert isinstance(edit.inner, ControlPoints)
+    points = edit.inner.with_reach(connected=True)
+    return edit.replace(inner=points.with_detours(grid_around(points, seed)))

@@ -1,4 +1,4 @@
-"""Random edits with a lattice, for property tests."""
+"""Random edits of lattices."""
 
 from __future__ import annotations
 
@@ -39,13 +39,17 @@ def random_operation(rng: np.random.Generator, points: int) -> ops.Operation:
     return ops.MoveCorner(int(rng.integers(8)), by)
 
 
-def random_lattice_edit(seed: int) -> Continuous:
-    """A possible edit: a lattice of any kind in a box, one to three operations, each as far as it goes."""
+def random_lattice_edit(seed: int, interpolation: str | None = None) -> Continuous:
+    """A possible edit: a lattice in a box, one to three operations, each as far as it goes.
+
+    Without `interpolation` seven of ten lattices are B-splines.
+    """
     rng = np.random.default_rng(seed)
     cells = rng.integers(1, rng.choice([3, 5, 8]), 3)
     turn = rng.uniform(-0.5, 0.5, 3) * (rng.random() < 0.5)
     box = Cage.box(rng.uniform(-0.1, 0.1, 3), rng.uniform(0.3, 1.0, 3), turn)
-    inner = box.subdivided([int(n) for n in cells], "bspline" if rng.random() < 0.7 else "linear")
+    drawn = "bspline" if rng.random() < 0.7 else "linear"
+    inner = box.subdivided([int(n) for n in cells], interpolation or drawn)
     outer = inner.grown(rng.uniform(0.15, 0.8))
     if rng.random() < 0.4:
         outer = Cage.box((0, 0, 0), rng.uniform(2.2, 3.0, 3))
