@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cagefield.edits import Edit, EditStack
+from cagefield.edits.grade import Grade, grade_sh
 from cagefield.errors import CagefieldError
 from cagefield.exporting import edited_splats
 from cagefield.exporting.similarity import transform_field
@@ -178,3 +179,30 @@ def test_a_cage_without_surface_says_so(folder: Path) -> None:
     empty = scene.edits[0].replace(inner=Cage.box((50.0, 0.0, 0.0), 1.0))
     with pytest.raises(CagefieldError, match="holds no surface of the pasted scene"):
         align_paste(scene, empty, *pairs(folder, 0.0), refine=True)
+
+
+@pytest.mark.parametrize("gains", [(1.0, 1.0, 1.0), (1.3, 0.8, 0.7), (0.5, 0.6, 0.9)])
+def test_a_grade_of_gains_has_them_as_its_matrix(gains: tuple[float, ...]) -> None:
+    np.testing.assert_allclose(Grade.from_gains(gains).matrix, np.diag(gains), atol=1e-12)
+
+
+@pytest.mark.parametrize("gains", [(1.0, 0.0, 1.0), (1.0, np.nan, 1.0), (1.0, 1.0)])
+def test_gains_that_are_none_are_refused(gains: tuple[float, ...]) -> None:
+    with pytest.raises(CagefieldError, match="three numbers above 0"):
+        Grade.from_gains(gains)
+
+
+def test_colors_are_matched_where_the_scenes_meet(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The other scene was taken darker and bluer; the aligned paste has this scene's colors."""
+    other = Scene.open(folder.parent / "other")
+    darker = Grade(exposure=-0.7, temperature=-0.5, tint=0.2)
+    sh = grade_sh(other.field.sh, np.broadcast_to(darker.matrix, (len(other.field), 3, 3)))
+    dataclasses.replace(other, field=dataclasses.replace(other.field, sh=sh)).save(
+        folder.parent / "other", overwrite=True
+    )
+    texts = [",".join(map(str, p)) for pair in zip(*pairs(folder, 0.0), strict=True) for p in pair]
+    said = printed(capsys, "align", folder, "--paste", "other", "--pairs", *texts, "--match-colors")
+    assert "colors      exposure" in said
+    (edit,) = Scene.open(folder).edits
+    back = edit.grading.matrix @ darker.matrix
+    np.testing.assert_allclose(back, np.eye(3), atol=0.03)

@@ -49,14 +49,18 @@ class Align:
     """Bring the surfaces of both scenes nearer after the pairs (iterative closest points)."""
     keep_scale: Flag = False
     """Leave the scale that the pairs give."""
+    match_colors: Flag = False
+    """Match exposure and white balance of the paste to this scene's where they come side by side."""
     device: Device = "auto"
 
     def run(self) -> None:
         """Check the options, write the scene's manifest or edits, print the alignment."""
         if self.paste is not None:
             return self._align_paste(self.paste)
-        if self.pairs or self.refine or self.keep_scale:
-            raise CagefieldError("--pairs, --refine and --keep-scale are for --paste; give its edit's name")
+        if self.pairs or self.refine or self.keep_scale or self.match_colors:
+            raise CagefieldError(
+                "--pairs, --refine, --keep-scale and --match-colors are for --paste; give its edit's name"
+            )
         from cagefield.scene.alignment import Alignment, meters_per_unit
         from cagefield.scene.scene import Scene
 
@@ -99,7 +103,13 @@ class Align:
             raise CagefieldError(f'"{name}" is no paste of this scene; its pastes are: {names or "none"}')
         points = [_numbers(text) for text in self.pairs]
         aligned = align_paste(
-            scene, found[0], points[::2], points[1::2], refine=self.refine, keep_scale=self.keep_scale
+            scene,
+            found[0],
+            points[::2],
+            points[1::2],
+            refine=self.refine,
+            keep_scale=self.keep_scale,
+            match_colors=self.match_colors,
         )
         stack = EditStack([aligned.edit if edit is found[0] else edit for edit in scene.edits])
         stack.check()
@@ -107,6 +117,12 @@ class Align:
         print(f"pairs       {aligned.residual:.4g} apart (root mean square, units of the scene)")
         if (fit := aligned.refinement) is not None:
             print(f"surfaces    {fit.distance:.4g} apart (median), {fit.distance_before:.4g} before")
+        if self.match_colors:
+            grade = aligned.edit.grading
+            print(
+                f"colors      exposure {grade.exposure:+.3f} stops, temperature {grade.temperature:+.3f}, "
+                f"tint {grade.tint:+.3f}"
+            )
         for operation in aligned.edit.operations:
             print(f"{operation.noun:<12}{operation}")
 

@@ -90,6 +90,23 @@ class Grade:
                 raise EditError(f"{name} of a grade must be {low:g} to {high:g}, got {value!r:.40}")
             object.__setattr__(self, name, float(value))
 
+    @classmethod
+    def from_gains(cls, gains: npt.ArrayLike) -> Grade:
+        """Grade whose matrix is diag(gains [3]), gains of display-encoded red, green and blue.
+
+        Raises `EditError` for gains that are not above 0, or out of a grade's range.
+        """
+        encoded = np.asarray(gains, np.float64)
+        if encoded.shape != (3,) or not (np.isfinite(encoded) & (encoded > 0.0)).all():
+            raise EditError(f"gains must be three numbers above 0, got {gains!r:.60}")
+        linear = encoded**GAMMA
+        red, green, blue = np.log2(linear).tolist()
+        return cls(
+            exposure=math.log2(float(linear @ LUMA)),
+            temperature=red - blue,
+            tint=(red + blue - 2.0 * green) / 1.5,
+        )
+
     @property
     def is_neutral(self) -> bool:
         """True where the grade changes nothing."""

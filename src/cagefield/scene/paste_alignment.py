@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from cagefield.edits import Paste
+from cagefield.edits.grade import Grade
 from cagefield.edits.operations import Rotate, Scale, Translate
 from cagefield.errors import EditError
 from cagefield.geometry.point_alignment import (
@@ -22,10 +24,21 @@ from cagefield.selection.field_elements import elements_of_field
 from cagefield.typing import Array
 
 if TYPE_CHECKING:
+    from cagefield.fields.splat_field import SplatField
+    from cagefield.fields.voxel_field import VoxelField
     from cagefield.scene.scene import Scene
 
 MIN_SURFACE_OPACITY = 0.5
 """Minimum opacity of an element that counts as surface."""
+
+MIN_MATCHED_COLOR = 0.03
+"""Minimum value of a channel whose ratio counts for a match of colors."""
+
+MAX_MATCHED_ELEMENTS = 20_000
+"""Maximum number of elements whose colors are compared."""
+
+MATCHED_QUANTILE = 0.7
+"""Share of the elements, the nearest to those of the scene, whose colors are compared."""
 
 _DECIMALS = 9
 """Decimals of operations, as a person would read them."""
@@ -51,28 +64,32 @@ def align_paste(
     *,
     refine: bool = False,
     keep_scale: bool = False,
+    match_colors: bool = False,
 ) -> AlignedPaste:
     """A paste whose source points [N,3], in the other scene, come to points [N,3] of this scene.
 
     Its operations are replaced by a scaling, a rotation and a translation. `refine` then brings the surfaces
     of the pasted cage's content nearer to those of this scene (`refine_similarity`); `keep_scale` leaves the
-    pairs' scale in that.
+    pairs' scale in that. `match_colors` replaces the edit's grade by the exposure and white balance of the
+    median ratio of colors between elements of this scene and those of the other that come beside them.
 
     Raises:
         CagefieldError: fewer than three pairs, points on a line, or a source that cannot be read.
     """
+    source = scene.sources.read(str(edit.source)).field if refine or match_colors else None
     similarity = fit_similarity(source_points, points)
     moved = similarity.transform_points(np.asarray(source_points, np.float64))
     residual = float(np.sqrt(((moved - np.asarray(points)) ** 2).sum(axis=1).mean()))
     refinement = None
-    if refine:
-        refinement = refine_similarity(
-            _surface(scene.sources.read(str(edit.source)).field, edit),
-            _surface(scene.field),
-            similarity,
-            keep_scale=keep_scale,
-        )
-        similarity = refinement.similarity
+    if source is not None:
+        theirs, ours = _surface(source, edit), _surface(scene.field)
+        if refine:
+            refinement = refine_similarity(
+                theirs.positions, ours.positions, similarity, keep_scale=keep_scale
+            )
+            similarity = refinement.similarity
+        if match_colors:
+            edit = edit.replace(grading=Grade.from_gains(_gains(theirs, ours, similarity)))
     return AlignedPaste(placed(edit, similarity), residual, refinement)
 
 
@@ -89,13 +106,42 @@ def placed(edit: Paste, similarity: Similarity) -> Paste:
     return edit.then(Translate((x, y, z)))
 
 
-def _surface(field: object, edit: Paste | None = None) -> Array:
-    """Positions [N,3] of the opaque elements of a field; of a paste's field those in its inner cage."""
-    elements = elements_of_field(field)  # type: ignore[arg-type]
+@dataclass(frozen=True, eq=False)
+class _Surface:
+    """Opaque elements: positions [N,3], canonical space, and display-encoded colors [N,3]."""
+
+    positions: Array
+    rgb: Array
+
+
+def _surface(field: VoxelField | SplatField, edit: Paste | None = None) -> _Surface:
+    """The opaque elements of a field; of a paste's field those in its inner cage."""
+    elements = elements_of_field(field)
     is_opaque = elements.opacities >= MIN_SURFACE_OPACITY
     if edit is not None:
         is_opaque &= edit.inner.contains(elements.positions.astype(np.float64))
     if is_opaque.sum() < 3:
         where = "its cage holds no surface of the pasted scene" if edit is not None else "no surface is here"
         raise EditError(f"{where} to be aligned; align by the pairs alone")
-    return elements.positions[is_opaque].astype(np.float64)
+    return _Surface(
+        elements.positions[is_opaque].astype(np.float64), elements.rgb[is_opaque].astype(np.float64)
+    )
+
+
+def _gains(theirs: _Surface, ours: _Surface, similarity: Similarity, *, seed: int = 0) -> Array:
+    """Median ratios [3] of our colors to theirs, of elements that a similarity brings side by side."""
+    rows = np.arange(len(theirs.positions))
+    if len(rows) > MAX_MATCHED_ELEMENTS:
+        rows = np.random.default_rng(seed).choice(rows, MAX_MATCHED_ELEMENTS, replace=False)
+    tree = cKDTree(ours.positions)
+    distance, nearest = tree.query(similarity.transform_points(theirs.positions[rows]), workers=-1)
+    count = max(1, int(MATCHED_QUANTILE * len(rows)))
+    near = np.argpartition(distance, count - 1)[:count]
+    theirs_rgb, ours_rgb = theirs.rgb[rows[near]], ours.rgb[nearest[near]]
+    gains = np.ones(3)
+    for channel in range(3):
+        a, b = theirs_rgb[:, channel], ours_rgb[:, channel]
+        bright = (a > MIN_MATCHED_COLOR) & (b > MIN_MATCHED_COLOR)
+        if bright.any():
+            gains[channel] = np.exp(np.median(np.log(b[bright] / a[bright])))
+    return gains
