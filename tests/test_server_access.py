@@ -63,6 +63,7 @@ def test_who_may_look_sees_all_and_changes_nothing(
             "place": {},
             "load_edits": {"text": "edits: []"},
             "scene_change": {"preserve_opacity": False},
+            "scale_change": {"meters_per_unit": 0.5},
             "play_begin": {"play": 1},
             "render": {"what": "test_views", "out": "pictures"},
             "export": {"form": "ply"},

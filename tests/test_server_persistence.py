@@ -44,6 +44,7 @@ def changed(path: Path) -> tuple[SceneStore, Session]:
     session.change(1, locked=True)
     session.set_path((KEY,), True)
     session.preserve_opacity(False)
+    session.set_scale(0.25)
     store.autosave(session)
     return store, session
 
@@ -55,7 +56,7 @@ def test_saving_writes_everything_and_opening_finds_it(path: Path) -> None:
     assert session.saved and session.document.entry(1).locked
     scene = Scene.open(path)
     assert scene.edits[0] == BALL.translate((0.1, 0, 0)).replace(fill="none", relight="none")
-    assert not scene.preserve_opacity
+    assert not scene.preserve_opacity and scene.alignment.meters_per_unit == 0.25
     assert load_keys(path / "camera_path.json") == ((KEY,), True)
     assert before["field.safetensors"] == files_of(path)["field.safetensors"]
     assert opened(path)[1].document.keys == (KEY,)
@@ -70,6 +71,7 @@ def test_an_autosave_is_restored_as_one_entry_and_saving_removes_it(path: Path) 
     fresh.restore(found)
     assert fresh.document.stack == session.document.stack
     assert fresh.document.keys == (KEY,) and fresh.document.loop and not fresh.document.preserve_opacity
+    assert fresh.document.meters_per_unit == 0.25
     assert fresh.document.entry(1).locked and not fresh.saved
     fresh.undo()
     assert fresh.saved and fresh.document.stack == EditStack([BALL])

@@ -239,6 +239,8 @@ def test_undo_and_redo_of_everything() -> None:
     did()
     s.preserve_opacity(False)
     did()
+    s.set_scale(0.25)
+    did()
     s.set_path((Keyframe(tuple(np.eye(4).reshape(-1)), 40.0),), True)
     did()
     s.place(np.array([0.5, 0.0, 0.0]), 1.0)

@@ -50,6 +50,7 @@ export function state(change: Partial<State> = {}): State {
     path: "scene",
     is_file: false,
     preserve_opacity: false,
+    meters_per_unit: null,
     keys: [],
     loop: false,
     selection: null,

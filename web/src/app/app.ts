@@ -54,6 +54,7 @@ const CANVAS_KEYS = [
   "corners",
   "hover",
   "selecting",
+  "measured",
   "cages",
   "grid",
   "view",
@@ -228,7 +229,8 @@ export class App {
     const { selection } = now.state ?? { selection: null };
     this.highlight.draw(selection !== null && this.drag === null && now.preview === null && !now.before);
     const hasGizmo = now.tool !== "select" || now.corners.length > 0;
-    const isMovable = edit !== null && dragObstacle(now, edit) === null && now.selecting === null;
+    const isMovable =
+      edit !== null && dragObstacle(now, edit) === null && now.selecting === null && now.measured === null;
     if (!isMovable || !showsCages(now) || !hasGizmo) {
       this.gizmo.hide();
       return;

@@ -3,6 +3,7 @@ import { Actions } from "../editing/actions";
 import { App } from "./app";
 import { testApi } from "./test_api";
 import { bindings, listenForKeys } from "../editing/keys";
+import { MeasureTool } from "../editing/measure_tool";
 import { Pointer } from "../editing/pointer";
 import { RegionTools } from "../editing/region_tools";
 import { storeSession } from "./session_storage";
@@ -30,6 +31,8 @@ const questions = dialogs(app);
 const actions = new Actions(app, () => questions.saveAs());
 const regions = new RegionTools(app);
 const pointer = new Pointer(app);
+const measure = new MeasureTool(app, (distance) => questions.scale(distance));
+pointer.measure = (x, y) => measure.add(x, y);
 const keys = bindings(app, actions, pointer, regions, questions);
 listenForKeys(app, actions, pointer, keys);
 
@@ -45,7 +48,7 @@ const controls = h(
   jobs(app),
 );
 const panel = h("aside", { class: "panel" }, controls);
-view.append(regions.element, overlay(app, pointer));
+view.append(regions.element, measure.element, overlay(app, pointer));
 root.append(
   topbar(app, actions, questions),
   toolbar(app, actions),

@@ -14,6 +14,7 @@ import type {
   Preview,
   SelectRegion,
   State,
+  Vec3,
 } from "../net/protocol";
 
 export type Tool = "select" | "translate" | "rotate" | "scale";
@@ -73,6 +74,8 @@ export interface Editor {
   hover: Hover | null;
   /** The tool that selects elements; null for the tools of cages. */
   selecting: SelectTool | null;
+  /** The points of the measured distance, world space, two at most; null without the measuring tool. */
+  measured: Vec3[] | null;
   selectMode: SelectMode;
   /** Radius of the brush, a share of the height of the view. */
   brushRadius: number;
@@ -120,6 +123,7 @@ export const INITIAL: Editor = {
   curve: "smooth",
   hover: null,
   selecting: null,
+  measured: null,
   selectMode: "replace",
   brushRadius: 0.04,
   through: false,

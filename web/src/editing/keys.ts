@@ -7,7 +7,7 @@ import { READ_ONLY_NOTICE, isReadOnly } from "../app/store";
 import type { Dialogs } from "../ui/dialogs";
 
 /** Keys that read-only pages have in addition to those of the view. */
-const READ_ONLY_KEYS = ["Escape", "Ctrl+C", "?"];
+const READ_ONLY_KEYS = ["Escape", "Ctrl+C", "Shift+M", "?"];
 
 export interface Binding {
   /** Keys with the same action, as the help shows them: "Ctrl+Shift+Z". */
@@ -61,6 +61,12 @@ export function bindings(
       keys: ["Alt+O"],
       action: "Connected only: control points reach through dense matter alone",
       run: () => actions.toggleConnected(),
+    },
+    {
+      group: "Tools",
+      keys: ["Shift+M"],
+      action: "Measure between two points; sets the scene's scale in meters",
+      run: () => actions.toggleMeasuring(),
     },
     {
       group: "Selection",

@@ -31,6 +31,8 @@ export class Pointer {
   position = { x: 0, y: 0 };
   /** Whether the snapping key is held. */
   snapKey = false;
+  /** Called with the position of each click while the measuring tool is taken. */
+  measure: (x: number, y: number) => void = () => undefined;
   /** World axis to which a drag of corners is constrained. */
   private constraint: Constraint = null;
   private hold: Hold | null = null;
@@ -160,7 +162,8 @@ export class Pointer {
       this.hold = null;
       this.app.endDrag();
     } else if (this.pressed && event.button === 0 && this.travelPixels() < MAX_CLICK_PIXELS) {
-      if (event.altKey) this.chooseRow(event);
+      if (this.app.store.now.measured !== null) this.measure(this.position.x, this.position.y);
+      else if (event.altKey) this.chooseRow(event);
       else this.select();
     }
     this.free();
@@ -204,6 +207,7 @@ export class Pointer {
     const { now } = this.app.store;
     const edit = selectedEdit(now);
     this.app.gizmo.clearHover();
+    if (now.measured !== null) return null;
     if (edit === null || !showsCages(now) || dragObstacle(now, edit) !== null) return null;
     const { project } = this.app.viewport;
     const { x, y } = this.position;
@@ -339,7 +343,7 @@ export class Pointer {
 
   private place(event: MouseEvent): void {
     this.readPosition(event);
-    if (!this.firstPress.release || event.altKey) return;
+    if (!this.firstPress.release || event.altKey || this.app.store.now.measured !== null) return;
     const { width, height } = this.app.viewport.points;
     this.app.expectEdit();
     const at = { x: clamp(this.position.x / width), y: clamp(this.position.y / height) };

@@ -30,6 +30,7 @@ export type PageMessage =
   | OuterMargin
   | Change
   | SceneChange
+  | ScaleChange
   | Command
   | Mirror
   | Reorder
@@ -513,6 +514,13 @@ export interface SaveAs {
   overwrite?: boolean;
 }
 /**
+ * Change the scene's scale; None forgets it.
+ */
+export interface ScaleChange {
+  type: "scale_change";
+  meters_per_unit: number | null;
+}
+/**
  * Change options that hold for all edits.
  */
 export interface SceneChange {
@@ -786,6 +794,7 @@ export interface State {
   path: string;
   is_file: boolean;
   preserve_opacity: boolean;
+  meters_per_unit: number | null;
   keys: Key[];
   loop: boolean;
   selection: SelectionCount | null;

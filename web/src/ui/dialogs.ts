@@ -1,5 +1,6 @@
 /** Dialogs before files are written: destination, size, format. */
 import type { App } from "../app/app";
+import { describeDistance } from "../editing/measure_tool";
 import type { ExportSplats } from "../net/protocol";
 import { h } from "./dom";
 
@@ -20,6 +21,8 @@ export interface Dialogs {
   saveAs: () => void;
   paste: () => void;
   download: () => void;
+  /** Asks how many meters a distance in units of the scene is. */
+  scale: (distance: number) => void;
   render: (what: "test_views" | "camera_path") => void;
 }
 
@@ -89,6 +92,15 @@ export function dialogs(app: App): Dialogs {
             app.send({ type: "paste_scene", source: source.value });
           },
         );
+      });
+    },
+    scale(distance) {
+      const known = app.store.now.state?.meters_per_unit ?? null;
+      const meters = h("input", { type: "number", min: "0", step: "any", required: true, name: "meters" });
+      meters.value = known === null ? "" : String(Number((distance * known).toPrecision(6)));
+      ask(`Distance: ${describeDistance(distance, null)}`, "Set the scale", [field("Meters", meters)], () => {
+        const length = Number(meters.value);
+        if (length > 0) app.send({ type: "scale_change", meters_per_unit: length / distance });
       });
     },
     download() {

@@ -13,6 +13,7 @@ import {
   PencilRuler,
   Radius,
   Rotate3d,
+  Ruler,
   Scale3d,
   Spline,
   Square,
@@ -138,13 +139,22 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
       snap,
       proportional,
       add(
+        iconButton(
+          Ruler,
+          "Measure between two points (Shift+M); sets the scale in meters",
+          () => actions.toggleMeasuring(),
+          "measure",
+        ),
+        (e) => e.measured !== null,
+      ),
+      add(
         iconButton(Axis3d, "Show or hide the cages (Shift+O)", () => actions.toggle("cages"), "cages"),
         (e) => e.cages,
       ),
     ),
   );
   app.store.watch(
-    ["hello", "tool", "selecting", "mode", "cage", "axes", "snap", "proportional", "cages"],
+    ["hello", "tool", "selecting", "measured", "mode", "cage", "axes", "snap", "proportional", "cages"],
     (now) => {
       for (const element of editing) element.hidden = isReadOnly(now);
       for (const [button, on] of lit) button.classList.toggle("on", on(now));

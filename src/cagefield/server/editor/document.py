@@ -40,7 +40,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Document:
-    """The edits in order, the scene's opacity choice, the camera path's keyframes, and the selected elements.
+    """The edits in order, the scene's opacity choice and scale, the camera path, and the selected elements.
 
     The selection is undone as edits are, all pages share it, and no file has it; None selects nothing.
     Elements in `removed` are deleted from the field; None deletes nothing.
@@ -52,6 +52,7 @@ class Document:
     loop: bool = False
     selection: Selection | None = None
     removed: Selection | None = None
+    meters_per_unit: float | None = None
 
     @classmethod
     def from_edits(
@@ -62,9 +63,10 @@ class Document:
         keys: tuple[Keyframe, ...] = (),
         loop: bool = False,
         removed: Selection | None = None,
+        meters_per_unit: float | None = None,
     ) -> Document:
         """The document of an edit stack, its edits numbered from 1."""
-        document = cls((), preserve_opacity, keys, loop, removed=removed)
+        document = cls((), preserve_opacity, keys, loop, None, removed, meters_per_unit)
         for number, edit in enumerate(edits, start=1):
             document = document.insert(Entry(number, edit, document.next_colour))
         return document

@@ -25,6 +25,7 @@ from cagefield.files.atomic import replaced_file
 from cagefield.files.safe_open import FileState, read_bytes, read_text, real_path
 from cagefield.files.stale_files import remove_leftovers, remove_unfinished
 from cagefield.files.temporary_folders import remove_abandoned
+from cagefield.scene.alignment import Alignment
 from cagefield.scene.removed_elements import Removal, dump_removed, read_removed
 from cagefield.scene.scene import Scene
 from cagefield.scene.scene_files import FIELD, REMOVED, field_states
@@ -97,6 +98,7 @@ class SceneStore:
             keys=keys,
             loop=loop,
             removed=read_removed(self.path if self.source is None else self.origin),
+            meters_per_unit=self.scene.alignment.meters_per_unit,
         )
 
     def recovered(self) -> Document | None:
@@ -314,6 +316,7 @@ class SceneStore:
             preserve_opacity=document.preserve_opacity,
             folder=folder,
             removal=removal,
+            alignment=dataclasses.replace(self.scene.alignment, meters_per_unit=document.meters_per_unit),
         )
 
     def _fingerprint(self) -> str:
@@ -334,6 +337,7 @@ def _content(document: Document, edits: list[object]) -> dict[str, object]:
         "edits": {"version": VERSION, "edits": edits},
         "locked": [entry.locked for entry in document.entries],
         "preserve_opacity": document.preserve_opacity,
+        "meters_per_unit": document.meters_per_unit,
         "loop": document.loop,
         "removed": None if document.removed is None else dump_selection(document.removed),
         "keys": [
@@ -371,6 +375,7 @@ def _parsed(content: dict[str, object]) -> Document:
         keys=keys,
         loop=bool(content["loop"]),
         removed=None if removed is None else parse_selection(removed),
+        meters_per_unit=Alignment(content.get("meters_per_unit")).meters_per_unit,  # type: ignore[arg-type]
     )
     locked = content["locked"]
     entries = tuple(

@@ -413,6 +413,11 @@ class Session:
         if value != self.document.preserve_opacity:
             self._push("Preserve opacity", replace(self.document, preserve_opacity=value))
 
+    def set_scale(self, meters_per_unit: float | None) -> None:
+        """The scene's scale in meters; None forgets it."""
+        if meters_per_unit != self.document.meters_per_unit:
+            self._push("Scale in meters", replace(self.document, meters_per_unit=meters_per_unit))
+
     def select(self, number: int | None) -> None:
         """Select an edit on all pages; no entry of the history."""
         if number is not None:

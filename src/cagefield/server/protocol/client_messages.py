@@ -206,6 +206,13 @@ class SceneChange(Message):
     preserve_opacity: bool
 
 
+class ScaleChange(Message):
+    """Change the scene's scale; None forgets it."""
+
+    type: Literal["scale_change"] = "scale_change"
+    meters_per_unit: Annotated[float, Field(gt=0, lt=1e12)] | None
+
+
 class Command(Message):
     """Command with an edit's number as its only argument."""
 
@@ -308,8 +315,8 @@ class CancelJob(Message):
 PageMessage: TypeAlias = Annotated[
     CameraMessage | DisplayMessage | PresentedMessage | Drawing | DragBegin | DragMove | DragEnd | DragCancel
     | PlayBegin | Play | PlayEnd | Apply | SetCage | Place | PasteScene | FitInner | OuterMargin | Change
-    | SceneChange | Command | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath | RenderJob
-    | ExportSplats | CancelJob | SelectionMessage | PointMessage,
+    | SceneChange | ScaleChange | Command | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath
+    | RenderJob | ExportSplats | CancelJob | SelectionMessage | PointMessage,
     Field(discriminator="type"),
 ]  # fmt: skip
 

@@ -137,6 +137,7 @@ class State(Message):
     is_file: bool
     """True for a file that was opened: there is no folder to save into before one is chosen."""
     preserve_opacity: bool
+    meters_per_unit: float | None
     keys: list[Key]
     loop: bool
     selection: SelectionCount | None

@@ -109,6 +109,7 @@ class Exports:
                 document.preserve_opacity,
                 str(path),
                 document.removed,
+                document.meters_per_unit,
             )
         except asyncio.CancelledError:
             self._forget(export)
@@ -134,9 +135,10 @@ def write_edited(
     preserve_opacity: bool,
     out: str,
     removed: Selection | None = None,
+    meters_per_unit: float | None = None,
 ) -> int:
-    """Writes the splats of a scene's folder under other edits, and without other elements, than its own;
-    returns how many there are."""
+    """Writes the splats of a scene's folder under other edits, without other elements, and in another scale
+    than its own; returns how many there are."""
     import dataclasses
 
     from cagefield.exporting import edited_splats, upright
@@ -152,7 +154,9 @@ def write_edited(
         dataclasses.replace(opened, field=field, edits=stack, preserve_opacity=preserve_opacity)
     )
     Path(out).parent.mkdir(parents=True, exist_ok=True)
-    write_splats(upright(aligned_splats(splats, opened), opened.up), out)
+    alignment = dataclasses.replace(opened.alignment, meters_per_unit=meters_per_unit)
+    aligned = aligned_splats(splats, dataclasses.replace(opened, alignment=alignment))
+    write_splats(upright(aligned, opened.up), out)
     return len(splats)
 
 

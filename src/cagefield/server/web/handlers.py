@@ -334,6 +334,11 @@ class MessageHandlers:
         self._session.preserve_opacity(message.preserve_opacity)
         self._coordinator.changed()
 
+    @_handles(client_messages.ScaleChange)
+    def _scale_change(self, message: client_messages.ScaleChange) -> None:
+        self._session.set_scale(message.meters_per_unit)
+        self._coordinator.changed()
+
     @_handles(client_messages.Command)
     def _command(self, message: client_messages.Command) -> None:
         session = self._session
