@@ -301,9 +301,9 @@ def test_the_selection_is_deleted_saved_and_restored(editor: EditorPage, server:
 
 
 def test_a_page_that_draws_itself_leaves_deleted_splats_out(server: EditorServer) -> None:
-    with editor_page(asking(server.link, "page"), 760, 520) as editor:
+    with editor_page(asking(server.link, "all"), 760, 520) as editor:
         editor.ready()
-        editor.until("cagefield.page.draws")
+        editor.until("cagefield.page.here === 'all' && cagefield.page.draws")
         middle, radius = ball_at(editor)
 
         def red() -> int:
@@ -313,10 +313,11 @@ def test_a_page_that_draws_itself_leaves_deleted_splats_out(server: EditorServer
         before = red()
         editor.press("j")
         editor.page.locator(".selection .tp-lblv", has_text="Through all").locator("label").click()
-        selected(editor, lambda: stroke(editor, around(middle, 1.15 * radius)))
+        editor.changed(lambda: stroke(editor, around(middle, 1.15 * radius)))
         editor.changed(lambda: editor.press("Delete"))
         editor.settle()
-        assert editor.page.evaluate("cagefield.page.draws && cagefield.page.why === null")
+        drawn_here = "cagefield.page.here === 'all' && cagefield.page.draws && cagefield.page.why === null"
+        assert editor.page.evaluate(drawn_here)
         assert red() < 0.05 * before
         editor.changed(lambda: editor.press("Control+z"))
         editor.settle()
