@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cagefield.cameras.camera import Camera
 from cagefield.scene.scene import Scene
 from editor_cone import cone
-from editor_page import EditorPage, asking, editor_page
+from editor_page import EditorPage, editor_page
 from editor_server import EditorServer, editor_server
 from page_shots import shot
 from splat_scenes import BALL_RADIUS, ball_and_floor
@@ -303,26 +303,3 @@ def test_the_selection_is_deleted_saved_and_restored(editor: EditorPage, server:
     editor.changed(lambda: editor.press("Control+s"))
     assert len(Scene.open(editor.state["path"]).field) == BALL + FLOOR
     editor.press("Escape", "Escape")
-
-
-def test_a_page_that_draws_itself_leaves_deleted_splats_out(server: EditorServer) -> None:
-    with editor_page(asking(server.link, "page"), 760, 520) as editor:
-        editor.ready()
-        editor.until("cagefield.page.draws")
-        middle, radius = ball_at(editor)
-
-        def red() -> int:
-            picture = shot(editor)
-            return int(((picture[..., 0] > 0.5) & (picture[..., 1] < 0.3)).sum())
-
-        before = red()
-        editor.press("j")
-        editor.page.locator(".selection .tp-lblv", has_text="Through all").locator("label").click()
-        selected(editor, lambda: stroke(editor, around(middle, 1.15 * radius)))
-        editor.changed(lambda: editor.press("Delete"))
-        editor.settle()
-        assert editor.page.evaluate("cagefield.page.draws && cagefield.page.why === null")
-        assert red() < 0.05 * before
-        editor.changed(lambda: editor.press("Control+z"))
-        editor.settle()
-        assert abs(red() - before) < 0.02 * before
