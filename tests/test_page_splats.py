@@ -12,7 +12,7 @@ import pytest
 
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion.splat_patch import build_splat_patch
-from cagefield.edits import Edit, EditStack, Grade, PreparedEdit, PreparedStack
+from cagefield.edits import Edit, EditStack, PreparedEdit, PreparedStack
 from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats.splat_files import read_splats
 from cagefield.geometry.cage import Cage
@@ -261,12 +261,10 @@ COPIED = (
 )
 GONE = Edit.delete(Cage.box((0.6, 0.5, 0.3), (0.9, 0.9, 1.0)))
 STRETCHED = Edit.move(INNER).scale(1.6)
-GRADE = Grade(exposure=0.6, temperature=0.8, tint=0.2, saturation=1.4, hue_deg=100.0, opacity=0.5)
 STACKS = {
     "moved": [MOVED],
     "twisted and deleted": [GONE, TWISTED],
     "copied": [TWISTED, COPIED],
-    "graded": [TWISTED.replace(grading=GRADE), MOVED.grade(exposure=3.0, saturation=0.2)],
     "mirrored": [MOVED.mirror("x"), COPIED.mirror("y")],
 }
 
