@@ -17,6 +17,7 @@ from cagefield.fields.sh import sh_basis
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.images.metrics import psnr
+from cagefield.pages.page_splat_edits import COLOR_RANGES, decode_colors, encode_colors
 from cagefield.rendering.edited_field import EditedField
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.splats.bake_splats import baked_splats
@@ -249,3 +250,11 @@ def test_a_share_of_an_edit_has_a_share_of_its_grade() -> None:
     assert half is not None
     assert half.grading == Grade(-0.2, 0.35, -0.15, 1.15, 35.0, 0.7)
     assert partial_edit(edit, 1.0) is edit
+
+
+@pytest.mark.parametrize("largest", [1.0, 1.9, 5.0, 20.0])
+def test_matrices_of_pages_keep_their_entries(largest: float) -> None:
+    """Nine entries of 14 bits, to half a step of the range that holds the largest one."""
+    matrices = np.random.default_rng(0).uniform(-largest, largest, (500, 3, 3)).astype(np.float32)
+    reach = next(value for value in COLOR_RANGES[1:] if value >= largest)
+    np.testing.assert_allclose(decode_colors(encode_colors(matrices)), matrices, atol=0.51 * reach / 8191)

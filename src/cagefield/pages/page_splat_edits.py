@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.errors import EditError, FieldError
+from cagefield.errors import FieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.quaternions import quaternions_from_matrices
 from cagefield.pages.page_file import LEVEL, QUICK_LEVEL, pack, unpack
@@ -113,9 +113,7 @@ GAIN_STEP = 1.0 / 128.0
 def gains_of(changed: ChangedSplats) -> NDArray[np.int32]:
     """The encoded gains [M] of changed splats, or their matrices [4,M] where an edit grades colors."""
     gains = np.ones((len(changed.sources), 3), np.float32) if changed.gains is None else changed.gains
-    if changed.colors is not None:
-        raise EditError("pages draw no graded splats yet; let the server draw, or export a splat file")
-    return encode_gains(gains)
+    return encode_gains(gains) if changed.colors is None else encode_colors(changed.colors * gains[:, None])
 
 
 def encode_gains(gains: Float32) -> NDArray[np.int32]:
