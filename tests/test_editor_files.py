@@ -59,13 +59,11 @@ def editor(folder: Path) -> Iterator[EditorPage]:
         yield page
 
 
-@pytest.mark.nightly
 def test_a_file_is_there_at_once(editor: EditorPage) -> None:
     assert editor.page.inner_text(".scene-name") == "ball.ply"
     assert cone(editor.pixels()).area > 500
 
 
-@pytest.mark.nightly
 def test_the_edited_splats_download_with_the_edits_in_them(editor: EditorPage, folder: Path) -> None:
     (folder.parent / "ball.yaml").write_text(EDIT)
     editor.load(folder.parent / "ball.yaml")

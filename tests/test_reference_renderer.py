@@ -187,6 +187,7 @@ def test_emptied_samples_and_stretch():
             viewdirs=along / stretch[:, None],
             stretch=stretch,
             layer=np.where(np.isnan(points[:, 0]), -1, 0),
+            grade=None,
         )
 
     squeeze = SimpleNamespace(bounds=None, layers=(), to_canonical=to_canonical)

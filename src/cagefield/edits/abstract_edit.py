@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
-from typing import Any, TypedDict, TypeVar
+from typing import Any, TypedDict, TypeVar, cast
 
 import numpy as np
 
@@ -180,10 +180,14 @@ class AbstractEdit(Transformable):
         """True where the edit changes color or opacity by its `grading`."""
         return not self.grading.is_neutral
 
-    @cached_property
+    @property
     def ungraded(self: AnyEdit) -> AnyEdit:
         """The edit with a neutral grade; itself where it has one."""
-        return self.replace(grading=NEUTRAL_GRADE) if self.is_graded else self
+        return cast(AnyEdit, self._ungraded) if self.is_graded else self
+
+    @cached_property
+    def _ungraded(self) -> AbstractEdit:
+        return self.replace(grading=NEUTRAL_GRADE)
 
     @property
     def changes_anything(self) -> bool:
