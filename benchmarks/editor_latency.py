@@ -129,6 +129,10 @@ class EditorLatency:
             shutil.rmtree(folder)
         environment = os.environ | {"XDG_CACHE_HOME": str(cache), "PYTHONUNBUFFERED": "1"}
         if self.source is not None:
+            if not (self.source / "cagefield").is_dir():
+                raise CagefieldError(
+                    f"{self.source} holds no package cagefield; give the src folder of a version"
+                )
             environment["PYTHONPATH"] = str(self.source)
         with tempfile.TemporaryDirectory() as scratch, sync_playwright() as playwright:
             copy = Path(scratch) / "scene"
