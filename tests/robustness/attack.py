@@ -26,7 +26,7 @@ SLACK = 16 << 20
 """Bytes beside twice the honest file's: seeds are small, allocators take whole pages and arenas."""
 
 LARGE_SLACK = 0
-"""The same where the honest files are large (`large_readers.py`)."""
+"""Bytes beside twice the honest file's where honest files are large (`large_readers.py`)."""
 
 
 Work = tuple[str, int, int]

@@ -11,6 +11,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,7 @@ class SplatGrid:
         """Density [X,Y,Z] per world unit, independent of the direction (`SplatMixture.grid_sigma`)."""
         from cagefield.fields.kernels.splat_grid import add_densities
 
-        packed, sigma = self._packed(), np.zeros(self.count)
+        packed, sigma = self._packed, np.zeros(self.count)
 
         def add(first: int, end: int) -> None:
             add_densities(
@@ -55,7 +56,7 @@ class SplatGrid:
         """
         from cagefield.fields.kernels.splat_grid import add_colors
 
-        packed = self._packed()
+        packed = self._packed
         vertices = np.flatnonzero(mask)
         row = np.full(self.count, -1, np.int32)
         row.reshape(-1)[vertices] = np.arange(len(vertices), dtype=np.int32)
@@ -70,6 +71,7 @@ class SplatGrid:
         self._in_slabs(add)
         return (total / np.where(weight > 0.0, weight, 1.0)[:, None]).astype(np.float32)
 
+    @cached_property
     def _packed(self) -> PackedSplats:
         splats = self.splats
         return PackedSplats.from_arrays(splats.means, splats.log_scales, splats.quaternions, splats.opacities)

@@ -32,7 +32,8 @@ CELLS_PER_GAP = 2.5
 """Cells, at least, between the mesh and the outer cage."""
 
 CELLS_PER_MESH_GAP = 5.0
-"""The same in a mesh as outer cage: one cell at its surface stands still, one at the inner mesh moves."""
+"""Cells, at least, between an inner mesh and a mesh as outer cage: one at the outer surface stands still, one
+at the inner mesh moves."""
 
 STILL_CELLS = 2.2
 """Least distance of the inner mesh from a mesh as outer cage, in diagonals of a cell."""

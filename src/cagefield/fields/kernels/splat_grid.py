@@ -33,27 +33,35 @@ def z_range(a, b, c, p, q, r, limit, center, low, edge, count):
     return axis_range(center - mixed / square, root / square, low, edge, 0, count)
 
 
+@njit(inline="always", **FAST)
+def column(packed, i, dx, dy):
+    """The part of u of splat i that a column of vertices shares, at an offset (dx, dy) from the mean."""
+    return (
+        packed[i, 0] * dx + packed[i, 1] * dy,
+        packed[i, 3] * dx + packed[i, 4] * dy,
+        packed[i, 6] * dx + packed[i, 7] * dy,
+    )
+
+
 @njit(**FAST)
 def add_densities(packed, layers, half, low, edge, first, sigma):
     """Add `grid_sigma` of splats to a slab `sigma` [X,Y,Z]; layers [N,4] as in `densities`."""
     for i in range(len(packed)):
         x0, x1 = axis_range(packed[i, 9], half[i, 0], low[0], edge, first, sigma.shape[0])
         y0, y1 = axis_range(packed[i, 10], half[i, 1], low[1], edge, 0, sigma.shape[1])
+        p, q, r = packed[i, 2], packed[i, 5], packed[i, 8]
         for x in range(x0, x1):
             dx = low[0] + edge * x - packed[i, 9]
             for y in range(y0, y1):
                 dy = low[1] + edge * y - packed[i, 10]
-                a0 = packed[i, 0] * dx + packed[i, 1] * dy
-                b0 = packed[i, 3] * dx + packed[i, 4] * dy
-                c0 = packed[i, 6] * dx + packed[i, 7] * dy
+                a0, b0, c0 = column(packed, i, dx, dy)
                 z0, z1 = z_range(
-                    a0, b0, c0, packed[i, 2], packed[i, 5], packed[i, 8],
-                    packed[i, 13], packed[i, 11], low[2], edge, sigma.shape[2],
-                )  # fmt: skip
+                    a0, b0, c0, p, q, r, packed[i, 13], packed[i, 11], low[2], edge, sigma.shape[2]
+                )
                 u0 = layers[i, 0] * dx + layers[i, 1] * dy
                 for z in range(z0, z1):
                     dz = low[2] + edge * z - packed[i, 11]
-                    a, b, c = a0 + packed[i, 2] * dz, b0 + packed[i, 5] * dz, c0 + packed[i, 8] * dz
+                    a, b, c = a0 + p * dz, b0 + q * dz, c0 + r * dz
                     u = u0 + layers[i, 2] * dz
                     across = np.exp(-packed[i, 12] - 0.5 * max(a * a + b * b + c * c - u * u, 0.0))
                     sigma[x - first, y, z] -= layers[i, 3] * np.log(1.0 - across) * np.exp(-0.5 * u * u)
@@ -74,9 +82,7 @@ def add_colors(packed, colors, half, low, edge, first, row, weight, total):
             dx = low[0] + edge * x - packed[i, 9]
             for y in range(y0, y1):
                 dy = low[1] + edge * y - packed[i, 10]
-                a0 = packed[i, 0] * dx + packed[i, 1] * dy
-                b0 = packed[i, 3] * dx + packed[i, 4] * dy
-                c0 = packed[i, 6] * dx + packed[i, 7] * dy
+                a0, b0, c0 = column(packed, i, dx, dy)
                 z0, z1 = z_range(
                     a0, b0, c0, p, q, r, packed[i, 13], packed[i, 11], low[2], edge, row.shape[2]
                 )
