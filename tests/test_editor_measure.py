@@ -29,6 +29,10 @@ def test_a_measured_distance_sets_the_scale(tmp_path: Path) -> None:
         editor.settle()
         editor.press("Shift+M")
         assert page.evaluate("cagefield.now.measured.length") == 0
+        editor.press("Shift+M")
+        assert page.evaluate("cagefield.now.measured") is None
+        page.click(".tools .measure")
+        assert page.evaluate("cagefield.now.measured.length") == 0
         points = [(0.3, -0.4, 0.0), (-0.3, -0.4, 0.0)]
         for n, point in enumerate(points, start=1):
             at = page.evaluate(f"cagefield.project({list(point)})")
@@ -42,7 +46,7 @@ def test_a_measured_distance_sets_the_scale(tmp_path: Path) -> None:
         page.fill("dialog[open] input[name=meters]", "1.5")
         editor.changed(lambda: page.click("dialog[open] button.primary"))
         assert editor.state["meters_per_unit"] == pytest.approx(1.5 / distance)
-        label = page.evaluate("document.querySelector('.measure text').textContent")
+        label = page.evaluate("document.querySelector('.measurement text').textContent")
         assert label == "1.5 m"
         assert editor.state["edits"] == [] and editor.state["saved"] is False
         editor.changed(lambda: editor.press("Control+z"))

@@ -38,7 +38,7 @@ export class MeasureTool {
     private readonly host: MeasureHost,
     private readonly askScale: (distance: number) => void,
   ) {
-    this.element.setAttribute("class", "measure");
+    this.element.setAttribute("class", "measurement");
     this.element.append(this.line, ...this.marks, this.label);
     for (const mark of this.marks) mark.setAttribute("r", String(POINT_RADIUS_PIXELS));
     host.viewport.beforeFrame.push(() => this.show());
