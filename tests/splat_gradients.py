@@ -14,7 +14,6 @@ from cagefield.rendering.splats.rasterizer import (
     COLOR,
     camera_args,
     intrinsics,
-    kernels,
     project,
     tiled,
 )
@@ -47,24 +46,23 @@ def analytic(
     gradients = np.zeros((len(splats), GRADIENT_FLOATS), np.float32)
     curvatures = np.zeros((len(splats), CURVATURE_FLOATS), np.float32)
     sums = seen.gradients(color, slopes, stops)
-    with kernels():
-        backpropagate(
-            PairArgs(seen.order, seen.firsts, seen.slots, sums),
-            seen.packed,
-            ParameterArgs(
-                splats.means,
-                values["log_scales"].astype(np.float32),
-                values["quaternions"].astype(np.float32),
-                values["logits"].astype(np.float32),
-                splats.sh,
-            ),
-            splats.opacities,
-            camera_args(view, NEAR),
-            antialiased,
-            True,
-            gradients,
-            curvatures,
-        )
+    backpropagate(
+        PairArgs(seen.order, seen.firsts, seen.slots, sums),
+        seen.packed,
+        ParameterArgs(
+            splats.means,
+            values["log_scales"].astype(np.float32),
+            values["quaternions"].astype(np.float32),
+            values["logits"].astype(np.float32),
+            splats.sh,
+        ),
+        splats.opacities,
+        camera_args(view, NEAR),
+        antialiased,
+        True,
+        gradients,
+        curvatures,
+    )
     return gradients, curvatures, seen.order
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from cagefield.images.metrics import SSIM_WINDOW_PIXELS as METRIC_WINDOW
 from cagefield.images.metrics import ssim
-from cagefield.rendering.splats.rasterizer import kernels, tiled, untiled
+from cagefield.rendering.splats.rasterizer import tiled, untiled
 from cagefield.training.splats.kernels.ssim import MOMENT_PLANES, WINDOW_PIXELS, add_ssim_gradient
 
 WEIGHT, GAIN, BEHIND = 0.3, np.array([0.9, 1.0, 1.2], np.float32), np.array([0.2, 0.5, 0.7], np.float32)
@@ -24,13 +24,12 @@ def moment_slopes(picture: np.ndarray, target: np.ndarray) -> np.ndarray:
     height, width = picture.shape[:2]
     slopes = np.ones_like(tiled(picture))
     every = np.ones((len(slopes), slopes.shape[2]), np.float32)
-    with kernels():
-        add_ssim_gradient(
-            tiled(picture), tiled(target), width, height, GAIN, BEHIND, every, WEIGHT,
-            np.full((3, MOMENT_PLANES, height, width), np.nan, np.float32),
-            np.full((3, 3, height, width), np.nan, np.float32),
-            np.full((3, 2, height, width), np.nan, np.float32), slopes,
-        )  # fmt: skip
+    add_ssim_gradient(
+        tiled(picture), tiled(target), GAIN, BEHIND, every, WEIGHT,
+        np.full((3, MOMENT_PLANES, height, width), np.nan, np.float32),
+        np.full((3, 3, height, width), np.nan, np.float32),
+        np.full((3, 2, height, width), np.nan, np.float32), slopes,
+    )  # fmt: skip
     return untiled(slopes, width, height) - 1.0
 
 

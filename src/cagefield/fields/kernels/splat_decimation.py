@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import prange
 
 from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 
 
 @njit(**FAST)
@@ -46,16 +46,18 @@ def overlap(dx, dy, dz, one, other, both):
     return math.sqrt(max(ratio, 0.0)) * math.exp(-0.5 * square / det)
 
 
-@njit(parallel=True, **FAST)
-def merge_costs(means, covariances, blurred, channels, depths, colors, own, near, blur, most, costs):
+@parallel_njit(lambda *args: len(args[-1]), **FAST)
+def merge_costs(
+    begin, end, means, covariances, blurred, channels, depths, colors, own, near, blur, most, costs
+):
     """Write the cost [N,K] of merging splat n with its neighbor near[n, k]; inf with itself.
 
     means [N,3], covariances and blurred [N,6], channels [N,4] (a' and a' c), depths [N] A Li2(o), colors
     [N,3], own [N] <f, f>; blur: e^2; most: greatest Li2.
     """
-    for n in prange(near.shape[0]):
-        c, wide, both = np.empty(6), np.empty(6), np.empty(6)
-        whole = np.empty(4)
+    c, wide, both = np.empty(6), np.empty(6), np.empty(6)
+    whole = np.empty(4)
+    for n in range(begin, end):
         for k in range(near.shape[1]):
             m = near[n, k]
             if m == n:

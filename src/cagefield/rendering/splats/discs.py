@@ -23,7 +23,6 @@ from cagefield.rendering.splats.rasterizer import (
     Buffers,
     Region,
     camera_args,
-    kernels,
     pairs_of_tiles,
     untiled,
 )
@@ -50,16 +49,15 @@ class DiscProjection:
         """The picture [H,W,channels] (T, colour, depth along the ray x weight, normals)."""
         x, y, width, height = self.region
         out = np.empty((len(self.starts) - 1, channels, AREA), np.float32)
-        with kernels():
-            discs.blend(
-                self.packed,
-                self.ids,
-                self.starts,
-                -(-width // TILE_PX),
-                np.float32(self.near),
-                channels,
-                out,
-            )
+        discs.blend(
+            self.packed,
+            self.ids,
+            self.starts,
+            -(-width // TILE_PX),
+            np.float32(self.near),
+            channels,
+            out,
+        )
         picture = untiled(out, width, height)
         if channels >= DEPTH:
             at = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2) + 0.5
@@ -70,17 +68,16 @@ class DiscProjection:
         """Opacity [K] gathered before distances [K] along the rays of pixels [K,2] inside the picture."""
         out = np.zeros(len(pixels), np.float32)
         depths = np.asarray(distances) / self._lengths(np.asarray(pixels) + np.array(self.region[:2]))
-        with kernels():
-            discs.opacity_before(
-                self.packed,
-                self.ids,
-                self.starts,
-                -(-self.region[2] // TILE_PX),
-                np.float32(self.near),
-                np.ascontiguousarray(pixels, np.float32),
-                np.ascontiguousarray(depths, np.float32),
-                out,
-            )
+        discs.opacity_before(
+            self.packed,
+            self.ids,
+            self.starts,
+            -(-self.region[2] // TILE_PX),
+            np.float32(self.near),
+            np.ascontiguousarray(pixels, np.float32),
+            np.ascontiguousarray(depths, np.float32),
+            out,
+        )
         return out
 
     def _lengths(self, pixels: NDArray[Any]) -> NDArray[Any]:
@@ -114,19 +111,18 @@ def project_discs(
     packed = buffers.take("packed", (count, PACKED), np.float32)
     keys = buffers.take("keys", (count,), np.float32)
     tiles = buffers.take("tiles", (count, 4), np.int32)
-    with kernels():
-        discs.project(
-            DiscArgs(
-                splats.means,
-                splats.tangents,
-                splats.opacities,
-                splats.sh,
-                NO_ROTATIONS if splats.rotations is None else splats.rotations,
-            ),
-            _NO_NORMALS if normals is None else np.ascontiguousarray(normals),
-            camera_args(camera, near, region),
-            ProjectedSplats(packed, keys, tiles),
-        )
-        shown = np.flatnonzero(tiles[:, 1] > tiles[:, 0])
-        _, starts, ids, *_ = pairs_of_tiles(shown, keys, tiles, packed, True, width, height, buffers)
+    discs.project(
+        DiscArgs(
+            splats.means,
+            splats.tangents,
+            splats.opacities,
+            splats.sh,
+            NO_ROTATIONS if splats.rotations is None else splats.rotations,
+        ),
+        _NO_NORMALS if normals is None else np.ascontiguousarray(normals),
+        camera_args(camera, near, region),
+        ProjectedSplats(packed, keys, tiles),
+    )
+    shown = np.flatnonzero(tiles[:, 1] > tiles[:, 0])
+    _, starts, ids, *_ = pairs_of_tiles(shown, keys, tiles, packed, True, width, height, buffers)
     return DiscProjection(packed, starts, ids, camera, region, near)

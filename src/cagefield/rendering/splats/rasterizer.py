@@ -1,7 +1,7 @@
 """Splats rasterised on the CPU: projected, sorted by depth, blended in tiles; the host side of the kernels.
 
 A `Projection` is one camera's view of one set of splats; pictures, opacities along rays and gradients are
-asked of it. Kernels run one at a time in a process (`_LOCK`): Numba's threads are shared.
+asked of it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from scipy.special import spence
 
 from cagefield.cameras import lenses
 from cagefield.cameras.camera import Camera
-from cagefield.compute import devices
 from cagefield.rendering.splats.kernels import blending, projection, tile_binning
 from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE_PX
 from cagefield.rendering.splats.kernels.splat_args import CameraArgs, ProjectedSplats
@@ -27,7 +26,6 @@ from cagefield.typing import Float32
 
 Region = tuple[int, int, int, int]
 
-_LOCK = threading.RLock()
 _MODELS = {
     "pinhole": projection.PINHOLE,
     "opencv": projection.OPENCV,
@@ -101,8 +99,7 @@ class Projection:
         """The picture [tiles,channels,AREA] (T, colour, depth x weight, normals), and where tiles end."""
         out = np.empty((self.tiles, channels, AREA), np.float32)
         stops = np.empty(self.tiles, np.int64)
-        with kernels():
-            blending.blend(self.packed, self.ids, self.starts, self.across, channels, stops, out)
+        blending.blend(self.packed, self.ids, self.starts, self.across, channels, stops, out)
         return out, stops
 
     def picture(self, channels: int = DEPTH) -> Float32:
@@ -130,26 +127,24 @@ class Projection:
             weights = np.ones((self.tiles, AREA), np.float32)
         if sums is None or len(sums) < self.pairs:
             sums = np.empty((self.pairs, blending.SUMS), np.float32)
-        with kernels():
-            blending.gradients(
-                self.packed, self.ids, self.starts, stops, self.width, self.height, color, slopes, weights,
-                empty, np.float32(veil), sums,
-            )  # fmt: skip
+        blending.gradients(
+            self.packed, self.ids, self.starts, stops, self.width, self.height, color, slopes, weights,
+            empty, np.float32(veil), sums,
+        )  # fmt: skip
         return sums
 
     def opacity_before(self, pixels: NDArray[Any], distances: NDArray[Any]) -> Float32:
         """Opacity [K] gathered before distances [K] along the rays of pixels [K,2] inside the picture."""
         out = np.zeros(len(pixels), np.float32)
-        with kernels():
-            blending.opacity_before(
-                self.packed,
-                self.ids,
-                self.starts,
-                self.across,
-                np.ascontiguousarray(pixels, np.float32),
-                np.ascontiguousarray(distances, np.float32),
-                out,
-            )
+        blending.opacity_before(
+            self.packed,
+            self.ids,
+            self.starts,
+            self.across,
+            np.ascontiguousarray(pixels, np.float32),
+            np.ascontiguousarray(distances, np.float32),
+            out,
+        )
         return out
 
 
@@ -210,9 +205,8 @@ def project(
             view.origin, view.world_to_camera, view.focal, view.center, (width, height), view.limits, near,
             pinhole=view.model == projection.PINHOLE,
         )  # fmt: skip
-        with kernels():
-            rows, *coarser = clusters.rows(visible, detail)
-            levels = clusters.levels if coarser else ()
+        rows, *coarser = clusters.rows(visible, detail)
+        levels = clusters.levels if coarser else ()
         sources = [_Source(splats, rows)]
         sources += [
             _Source(level.splats, chosen, level.masses) for level, chosen in zip(levels, coarser, strict=True)
@@ -221,24 +215,23 @@ def project(
     packed = buffers.take("packed", (count, PACKED), np.float32)
     keys = buffers.take("keys", (count,), np.float32)
     tiles = buffers.take("tiles", (count, 4), np.int32)
-    with kernels():
-        shown, begin = [], 0
-        for source in sources:
-            end = begin + len(source.splats)
-            projection.project(
-                source.splats.kernel_args(),
-                _NO_NORMALS if normals is None else np.ascontiguousarray(normals),
-                _NO_MASSES if source.masses is None else source.masses,
-                _OPACITIES,
-                source.rows,
-                view,
-                splats.antialiased,
-                ProjectedSplats(packed[begin:end], keys[begin:end], tiles[begin:end]),
-            )
-            part = tiles[begin:end] if len(source.rows) == end - begin else tiles[begin:end][source.rows]
-            shown.append(source.rows[part[:, 1] > part[:, 0]] + np.int32(begin))
-            begin = end
-        tiled = pairs_of_tiles(np.concatenate(shown), keys, tiles, packed, False, width, height, buffers)
+    shown, begin = [], 0
+    for source in sources:
+        end = begin + len(source.splats)
+        projection.project(
+            source.splats.kernel_args(),
+            _NO_NORMALS if normals is None else np.ascontiguousarray(normals),
+            _NO_MASSES if source.masses is None else source.masses,
+            _OPACITIES,
+            source.rows,
+            view,
+            splats.antialiased,
+            ProjectedSplats(packed[begin:end], keys[begin:end], tiles[begin:end]),
+        )
+        part = tiles[begin:end] if len(source.rows) == end - begin else tiles[begin:end][source.rows]
+        shown.append(source.rows[part[:, 1] > part[:, 0]] + np.int32(begin))
+        begin = end
+    tiled = pairs_of_tiles(np.concatenate(shown), keys, tiles, packed, False, width, height, buffers)
     return Projection(packed, *tiled, width, height)
 
 
@@ -369,19 +362,6 @@ def untiled(tiles: NDArray[Any], width: int, height: int) -> NDArray[Any]:
     down, across = -(-height // TILE_PX), -(-width // TILE_PX)
     split = tiles.reshape(down, across, tiles.shape[1], TILE_PX, TILE_PX).transpose(0, 3, 1, 4, 2)
     return np.ascontiguousarray(split.reshape(down * TILE_PX, across * TILE_PX, -1)[:height, :width])
-
-
-class kernels:  # noqa: N801
-    """One kernel at a time, on as many threads as the devices module says."""
-
-    def __enter__(self) -> None:
-        import numba
-
-        _LOCK.acquire()
-        numba.set_num_threads(min(devices.threads(), numba.config.NUMBA_NUM_THREADS))
-
-    def __exit__(self, *_: object) -> None:
-        _LOCK.release()
 
 
 def near_depth(bounds: NDArray[Any]) -> float:

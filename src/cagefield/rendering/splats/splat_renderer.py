@@ -21,7 +21,6 @@ from cagefield.rendering.splats.rasterizer import (
     Buffers,
     Projection,
     Region,
-    kernels,
     near_depth,
     project,
 )
@@ -199,8 +198,7 @@ class SplatRenderer:
     def _clusters(self) -> Clusters:
         """The splats' clusters; those of edited splats lie in the order of the field's own."""
         own = DeformedSplats.of_field(self.field)
-        with kernels():
-            return Clusters.build(self.splats, None if own is self.splats else Clusters.build(own))
+        return Clusters.build(self.splats, None if own is self.splats else Clusters.build(own))
 
     def opacity_before(self, camera: Camera, pixels: NDArray[Any], distances: NDArray[Any]) -> Float32:
         """Opacity [K] gathered before distances [K] along the rays of pixel positions [K,2] of a camera.

@@ -9,7 +9,7 @@ from cagefield.cameras.camera import Camera
 from cagefield.rendering.splats.kernels.blending import SUMS
 from cagefield.rendering.splats.kernels.projection import AREA
 from cagefield.rendering.splats.raster_splats import DeformedSplats
-from cagefield.rendering.splats.rasterizer import COLOR, Buffers, Projection, camera_args, kernels, project
+from cagefield.rendering.splats.rasterizer import COLOR, Buffers, Projection, camera_args, project
 from cagefield.training.splats.kernels.gauss_newton_splats import StepArgs, gauss_newton, residuals
 from cagefield.training.splats.kernels.splat_backward import PairArgs, backpropagate, build_covariances
 from cagefield.training.splats.kernels.ssim import MOMENT_PLANES, add_ssim_gradient
@@ -43,8 +43,7 @@ class CpuSplatOptimizer:
         state, count = self.state, len(self.state)
         covariances = self._buffers.take("covariances", (count, 6), np.float32)
         self._opacities = self._buffers.take("opacities", (count,), np.float32)
-        with kernels():
-            build_covariances(state.log_scales, state.quaternions, state.logits, covariances, self._opacities)
+        build_covariances(state.log_scales, state.quaternions, state.logits, covariances, self._opacities)
         if kept is not None:
             self._opacities *= kept
         splats = DeformedSplats(state.means, covariances, self._opacities, state.sh, None, self._antialiased)
@@ -63,11 +62,10 @@ class CpuSplatOptimizer:
         self._color = self._buffers.take("color", (seen.tiles, 3, AREA), np.float32)
         self._slopes = self._buffers.take("slopes", (seen.tiles, 3, AREA), np.float32)
         sums = np.empty((seen.tiles, 7), np.float32)
-        with kernels():
-            residuals(
-                self._out, photo.target, seen.width, seen.height, photo.gain, photo.background, self._weights,
-                self._color, self._slopes, sums,
-            )  # fmt: skip
+        residuals(
+            self._out, photo.target, seen.width, seen.height, photo.gain, photo.background, self._weights,
+            self._color, self._slopes, sums,
+        )  # fmt: skip
         return sums
 
     def slopes(self) -> Float32:
@@ -78,35 +76,33 @@ class CpuSplatOptimizer:
         """See `SplatOptimizer.add_ssim`."""
         seen, photo = self._projected, self._photo
         size = (seen.height, seen.width)
-        with kernels():
-            add_ssim_gradient(
-                self._color, photo.target, seen.width, seen.height, photo.gain, photo.background,
-                self._weights, weight,
-                self._buffers.take("moments", (3, MOMENT_PLANES, *size), np.float32),
-                self._buffers.take("moment_slopes", (3, 3, *size), np.float32),
-                self._buffers.take("pixels", (3, 2, *size), np.float32), self._slopes,
-            )  # fmt: skip
+        assert self._weights is not None, "`compare` comes first"
+        add_ssim_gradient(
+            self._color, photo.target, photo.gain, photo.background, self._weights, weight,
+            self._buffers.take("moments", (3, MOMENT_PLANES, *size), np.float32),
+            self._buffers.take("moment_slopes", (3, 3, *size), np.float32),
+            self._buffers.take("pixels", (3, 2, *size), np.float32), self._slopes,
+        )  # fmt: skip
 
     def backpropagate(self, free_distances: Float32, empty_space_penalty: float) -> None:
         """See `SplatOptimizer.backpropagate`."""
         seen, state = self._projected, self.state
         sums = self._buffers.take("sums", (max(seen.pairs, 1), SUMS), np.float32)
-        with kernels():
-            seen.gradients(
-                self._color, self._slopes, self._stops, sums, free_distances, empty_space_penalty,
-                self._weights,
-            )  # fmt: skip
-            backpropagate(
-                PairArgs(seen.order, seen.firsts, seen.slots, sums),
-                seen.packed,
-                state.parameter_args(),
-                self._opacities,
-                camera_args(self._camera, self._near),
-                self._antialiased,
-                False,
-                state.gradients,
-                state.curvatures,
-            )
+        seen.gradients(
+            self._color, self._slopes, self._stops, sums, free_distances, empty_space_penalty,
+            self._weights,
+        )  # fmt: skip
+        backpropagate(
+            PairArgs(seen.order, seen.firsts, seen.slots, sums),
+            seen.packed,
+            state.parameter_args(),
+            self._opacities,
+            camera_args(self._camera, self._near),
+            self._antialiased,
+            False,
+            state.gradients,
+            state.curvatures,
+        )
 
     def pose_sums(self) -> tuple[Array, Array]:
         """See `SplatOptimizer.pose_sums`."""
@@ -115,15 +111,14 @@ class CpuSplatOptimizer:
     def update(self, rule: StepArgs) -> None:
         """See `SplatOptimizer.update`."""
         state, visible = self.state, self._projected.order
-        with kernels():
-            gauss_newton(
-                visible,
-                state.gradients,
-                state.curvatures,
-                state.parameter_args(),
-                self._camera.origin,
-                state.average_args(),
-                rule,
-            )
+        gauss_newton(
+            visible,
+            state.gradients,
+            state.curvatures,
+            state.parameter_args(),
+            self._camera.origin,
+            state.average_args(),
+            rule,
+        )
         state.error[visible] += state.gradients[visible, 15]
         state.hits[visible] += 1

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cagefield.cameras import lenses
 from cagefield.cameras.camera import Camera
-from cagefield.rendering.splats.rasterizer import intrinsics, kernels, world_to_camera
+from cagefield.rendering.splats.rasterizer import intrinsics, world_to_camera
 from cagefield.typing import Array
 
 NEIGHBOR_COUNT = 4
@@ -91,20 +91,19 @@ def sweep_surfaces(
     count = _depth_count(cameras, chosen, min_depths)
     inverse = np.stack([np.linspace(0.0, 1.0 / near, count) for near in min_depths])
     sweep_result = np.empty((views, height, width, 3), np.float32)
-    with kernels():
-        sweep(
-            gray,
-            directions,
-            rotations,
-            origins,
-            np.stack([one.focal for one in lens]),
-            np.stack([one.center for one in lens]),
-            np.array([one.model for one in lens]),
-            np.stack([one.coefficients for one in lens]),
-            chosen,
-            inverse,
-            sweep_result,
-        )
+    sweep(
+        gray,
+        directions,
+        rotations,
+        origins,
+        np.stack([one.focal for one in lens]),
+        np.stack([one.center for one in lens]),
+        np.array([one.model for one in lens]),
+        np.stack([one.coefficients for one in lens]),
+        chosen,
+        inverse,
+        sweep_result,
+    )
     step = inverse[:, 1]
     w = sweep_result[..., 0] * step[:, None, None]
     accepted = (

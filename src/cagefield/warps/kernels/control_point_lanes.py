@@ -6,11 +6,11 @@ so that compilers use vector instructions. Blocks that nothing reaches at a time
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.compute.numba_cache import njit
+from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 from cagefield.typing import Array, Float32
 from cagefield.warps.control_point_motion import DISTANCE_POWER
 from cagefield.warps.falloff_curves import ROOT_END
@@ -24,7 +24,7 @@ _SPHERE_SCALE, _ROOT_SCALE = _SPHERE**-1.5, _ROOT**-1.5
 _HALF_POWER = DISTANCE_POWER // 2
 
 
-@njit(cache=True, fastmath=True, error_model="numpy")
+@njit(**FAST)
 def _weigh(number: int, s: Array) -> None:
     """Put the weights of a curve in the place of s [LANES] in [0,1]; numbers as in `FALLOFF_CURVES`."""
     if number == 0:
@@ -45,7 +45,7 @@ def _weigh(number: int, s: Array) -> None:
             s[i] = s[i] * s[i]
 
 
-@njit(cache=True, fastmath=True, error_model="numpy")
+@njit(**FAST)
 def _velocities(
     head: Array,
     now: Array,
@@ -127,7 +127,7 @@ def _velocities(
     return True
 
 
-@njit(cache=True, fastmath=True, error_model="numpy")
+@njit(**FAST)
 def _blend(
     head: Array, now: Array, n: int, y: Array, e: Array, near: Array, total: Array, least: float
 ) -> None:
@@ -151,8 +151,10 @@ def _blend(
         e[2, i] /= total[i]
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", parallel=True)
+@parallel_njit(lambda x, *_: (len(x) + LANES - 1) // LANES, **FAST)
 def march_lanes(
+    begin: int,
+    end: int,
     x: Array,
     head: Array,
     moments: Array,
@@ -168,13 +170,12 @@ def march_lanes(
     """
     n = (moments.shape[1] - PLACES) // 3
     blocks = (len(x) + LANES - 1) // LANES
-    for turn in numba.prange(blocks):
+    room, flat = np.empty((6, 3, LANES)), np.empty((3, LANES))
+    here, at, v, total, y, e = room[0], room[1], room[2], room[3], room[4], room[5]
+    near, w, sums = flat[0], flat[1], flat[2]
+    for turn in range(begin, end):
         first = (turn * stride) % blocks * LANES
         count = min(LANES, len(x) - first)
-        room = np.empty((6, 3, LANES))
-        here, at, v, total, y, e = room[0], room[1], room[2], room[3], room[4], room[5]
-        flat = np.empty((3, LANES))
-        near, w, sums = flat[0], flat[1], flat[2]
         for i in range(LANES):
             row = first + min(i, count - 1)
             here[0, i], here[1, i], here[2, i] = x[row, 0], x[row, 1], x[row, 2]

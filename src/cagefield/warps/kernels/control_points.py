@@ -9,11 +9,11 @@ the oracle.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.compute.numba_cache import njit
+from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 from cagefield.typing import Array, Float32
 from cagefield.warps.control_point_motion import DISTANCE_POWER
 from cagefield.warps.falloff_curves import ROOT_END
@@ -24,7 +24,6 @@ INVERSE, SLOPE, PLACES = 12, 21, 30
 
 _SPHERE, _ROOT = ROOT_END["sphere"], ROOT_END["root"]
 _HALF_POWER = DISTANCE_POWER // 2
-_BLOCK = 1024
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -51,7 +50,7 @@ def _curve(number: int, s: float) -> tuple[float, float]:
     return s, 1.0
 
 
-@njit(cache=True, fastmath=True, error_model="numpy")
+@njit(**FAST)
 def _velocity(
     head: Array,
     now: Array,
@@ -175,7 +174,7 @@ def _velocity(
     return True
 
 
-@njit(cache=True, fastmath=True, error_model="numpy")
+@njit(**FAST)
 def _runge_kutta(
     x: Array,
     J: Array,
@@ -225,8 +224,10 @@ def _runge_kutta(
                 J[i, a] += h / 6.0 * dJ[i, a]
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", parallel=True)
+@parallel_njit(lambda x, *_: len(x), **FAST)
 def march(
+    begin: int,
+    end: int,
     x: Array,
     J: Array,
     head: Array,
@@ -237,9 +238,7 @@ def march(
 ) -> None:
     """Take points x [N,3] and Jacobians J [N,3,3] through `steps` [K], in place."""
     n = (moments.shape[1] - PLACES) // 3
-    blocks = (len(x) + _BLOCK - 1) // _BLOCK
-    for block in numba.prange(blocks):
-        room = np.empty((15, 3))
-        for row in range(block * _BLOCK, min(len(x), (block + 1) * _BLOCK)):
-            for k in range(len(steps)):
-                _runge_kutta(x[row], J[row], head, moments, 2 * k, steps[k], n, room, nodes, place)
+    room = np.empty((15, 3))
+    for row in range(begin, end):
+        for k in range(len(steps)):
+            _runge_kutta(x[row], J[row], head, moments, 2 * k, steps[k], n, room, nodes, place)

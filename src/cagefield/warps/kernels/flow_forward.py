@@ -18,9 +18,9 @@ The oracle is `FlowShell.to_deformed`; of the velocity in it, `warps.flow_veloci
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
 from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 from cagefield.warps.flow_table import HEADER, MOMENT
 
 f32, U = np.float32, np.uint64
@@ -42,16 +42,15 @@ _DZ, _DXI, _V, _G, _LEFT, _LOST = (U(32 * n) for n in (45, 54, 63, 66, 75, 76))
 _ROWS = 77
 
 
-@njit(parallel=True, **FAST)
-def march(points, exact, bent_outer, bent_inner, newton_steps, followed, moved, jacobian, lost):
+@parallel_njit(lambda points, *_: (len(points) + 31) // 32, **FAST)
+def march(begin, end, points, exact, bent_outer, bent_inner, newton_steps, followed, moved, jacobian, lost):
     """Writes the ends [N,3] of the ways of points [N,3], d(end)/d(point) [N,3,3], and where lost [N].
 
     `followed` is the largest residual of coordinates, in units of xi, before the last of a stage's steps.
     """
     table = exact.astype(np.float32)
-    blocks = (len(points) + 31) // 32
-    for block in prange(blocks):
-        s = np.zeros(_ROWS * 32, np.float32)
+    s = np.zeros(_ROWS * 32, np.float32)
+    for block in range(begin, end):
         first = block * 32
         count = min(32, len(points) - first)
         _begin(points, first, count, exact, s)

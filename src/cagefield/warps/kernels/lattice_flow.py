@@ -7,9 +7,9 @@ fastest, one slice for each step.
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
 from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 
 
 @njit(inline="always", **FAST)
@@ -103,15 +103,13 @@ def flow_point(grids, steps, backwards, enough, z, J, slopes, work):
                 J[2, j] -= x2
 
 
-@njit(parallel=True, **FAST)
-def flow_points(grids, steps, backwards, enough, z, J):
+@parallel_njit(lambda grids, steps, backwards, enough, z, J: len(z), **FAST)
+def flow_points(begin, end, grids, steps, backwards, enough, z, J):
     """Takes points z [N,3] in [-1,1]^3 through all slices, and their Jacobians J [N,3,3] (or [0,3,3])."""
     slopes = len(J) > 0
-    batch = 64
-    for part in prange((len(z) + batch - 1) // batch):
-        work, none, first = np.empty((11, 3)), np.empty((3, 3)), np.intp(part) * batch
-        for n in range(first, min(first + batch, len(z))):
-            flow_point(grids, steps, backwards, enough, z[n], J[n] if slopes else none, slopes, work)
+    work, none = np.empty((11, 3)), np.empty((3, 3))
+    for n in range(begin, end):
+        flow_point(grids, steps, backwards, enough, z[n], J[n] if slopes else none, slopes, work)
 
 
 @njit(**FAST)
@@ -241,24 +239,20 @@ def invert_lattice_nearby(P, linear, target, u, enough, work):
     return True
 
 
-@njit(parallel=True, **FAST)
-def invert_lattice(P, linear, targets, u, enough, found):
+@parallel_njit(lambda P, linear, targets, u, *_: len(u), **FAST)
+def invert_lattice(begin, end, P, linear, targets, u, enough, found):
     """Newton's method for points [N,3] from u [N,3], in place; found [N]: those that arrived."""
-    batch = 64
-    for part in prange((len(u) + batch - 1) // batch):
-        work, first = np.empty((11, 9)), np.intp(part) * batch
-        for n in range(first, min(first + batch, len(u))):
-            found[n] = invert_lattice_point(P, linear, targets[n], u[n], enough, work)
+    work = np.empty((11, 9))
+    for n in range(begin, end):
+        found[n] = invert_lattice_point(P, linear, targets[n], u[n], enough, work)
 
 
-@njit(parallel=True, **FAST)
-def lattice_points(P, linear, u, x, J):
+@parallel_njit(lambda P, linear, u, *_: len(u), **FAST)
+def lattice_points(begin, end, P, linear, u, x, J):
     """Writes x(u) [N,3] and dx/du [N,3,3] at u [N,3]."""
-    batch = 64
-    for part in prange((len(u) + batch - 1) // batch):
-        weights, first = np.empty((3, 9)), np.intp(part) * batch
-        for n in range(first, min(first + batch, len(u))):
-            lattice_point(P, linear, u[n], x[n], J[n], weights)
+    weights = np.empty((3, 9))
+    for n in range(begin, end):
+        lattice_point(P, linear, u[n], x[n], J[n], weights)
 
 
 @njit(**FAST)
@@ -353,8 +347,8 @@ def _fill_batch(places, reach, dz, frame, samples, P, linear, settings, out, fir
                 out[n, o] += np.float32(w * v * dz[m, o, i])
 
 
-@njit(parallel=True, **FAST)
-def fill_slice(places, reach, dz, frame, samples, P, linear, settings, out):
+@parallel_njit(lambda places, *_: (len(places) + 255) // 256, **FAST)
+def fill_slice(begin, end, places, reach, dz, frame, samples, P, linear, settings, out):
     """Writes dz/ds [G^3,3] of one slice, float32.
 
     places [N,3] of the nodes in the world; reach [N], their 1 / d_o, -1 where nothing moves; dz [N or 1,3,3],
@@ -363,10 +357,8 @@ def fill_slice(places, reach, dz, frame, samples, P, linear, settings, out):
     the frame and their velocities; settings [5]: blur, a squared length; margin, a length; a, b and width of
     the falloff.
     """
-    batches = (len(places) + 255) // 256
-    local, work = np.empty((batches, 10)), np.empty((batches, 11, 9))
-    for part_ in prange(batches):
-        part = np.intp(part_)
+    local, work = np.empty(10), np.empty((11, 9))
+    for batch in range(begin, end):
         _fill_batch(
-            places, reach, dz, frame, samples, P, linear, settings, out, 256 * part, local[part], work[part]
+            places, reach, dz, frame, samples, P, linear, settings, out, np.intp(256 * batch), local, work
         )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numba import prange
 
 from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 from cagefield.warps.kernels.lattice_flow import invert_lattice_nearby
 
 U = np.uintp
@@ -98,6 +100,11 @@ def _uncorrect(X, confines, heights, material, table, most):
             break
 
 
+def _batches(*args: Any) -> int:
+    """Batches of the nodes of a cube whose resolution is the last argument but one."""
+    return int((args[-2] ** 3 + NODES_PER_BATCH - 1) // NODES_PER_BATCH)
+
+
 @njit(**FAST)
 def _place(n, place, resolution, x):
     """Writes the place x [3] of a node."""
@@ -139,17 +146,16 @@ def _flow_batch(grid, nodes, steps, frames, iterations, resolution, out, first):
             )
 
 
-@njit(parallel=True, **FAST)
-def flow_nodes_back(grid, nodes, steps, frames, iterations, resolution, out):
+@parallel_njit(_batches, **FAST)
+def flow_nodes_back(begin, end, grid, nodes, steps, frames, iterations, resolution, out):
     """Writes Phi^-1(x) - x [R^3,3] of nodes x of a box.
 
     grid [K N^3 4] float32, nodes N, steps [K]: velocities (x fastest, padded to 4) and steps of the flow;
     iterations of each step; frames [11,3]: center, dz/dx, dx/dz of the outer cage, then origin and edges of
     the nodes' box.
     """
-    count = resolution**3
-    for part in prange((count + NODES_PER_BATCH - 1) // NODES_PER_BATCH):
-        first = np.intp(part) * NODES_PER_BATCH
+    for batch in range(begin, end):
+        first = np.intp(batch) * NODES_PER_BATCH
         _flow_batch(grid, nodes, steps, frames, iterations, resolution, out, first)
 
 
@@ -188,8 +194,8 @@ def _sample_batch(frames, P, linear, table, near, resolution, out, first):
             out[n, m] = np.float32(X[m] - x[m])
 
 
-@njit(parallel=True, **FAST)
-def sample_nodes(frames, P, linear, table, near, resolution, out):
+@parallel_njit(_batches, **FAST)
+def sample_nodes(begin, end, frames, P, linear, table, near, resolution, out):
     """Displacements to canonical space [R^3,3] of the nodes of an outer cage with parallel faces, in place of
     those by the flow, Phi^-1(x) - x.
 
@@ -198,7 +204,6 @@ def sample_nodes(frames, P, linear, table, near, resolution, out):
     points; table: r on the faces; near: distance from the canonical cage after the flow up to which a node
     may be inside.
     """
-    count = resolution**3
-    for part in prange((count + NODES_PER_BATCH - 1) // NODES_PER_BATCH):
-        first = np.intp(part) * NODES_PER_BATCH
+    for batch in range(begin, end):
+        first = np.intp(batch) * NODES_PER_BATCH
         _sample_batch(frames, P, linear, table, near, resolution, out, first)

@@ -16,10 +16,10 @@ the centroid c: A n . (c - x) / |c - x|^4, with A n the area times the outward n
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 from numpy.polynomial import chebyshev
 
 from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 
 U = np.uintp
 
@@ -204,8 +204,8 @@ def _block(x, y, corners, motion, table, squares, sums, totals, away, part, some
                 totals[n + 4, l] += size * part[n, m]
 
 
-@njit(parallel=True, **FAST)
-def blend_motion(places, center, corners, motion, table, out):
+@parallel_njit(lambda places, *_: (len(places) + MESH_LANES - 1) // MESH_LANES, **FAST)
+def blend_motion(begin, end, places, center, corners, motion, table, out):
     """Writes out [N,4]: the motion blended at places [N,3], and their distance from the mesh, 0 inside.
 
     corners [F,3,3] of the triangles, their motion [F,3,3]; table [F,11] float32: centroids less center [3],
@@ -216,13 +216,12 @@ def blend_motion(places, center, corners, motion, table, out):
     all positive: a mean of the vertices' motion that does not grow with the distance. Both are the motion of
     the surface on it. The sum of the weights is positive inside, negative outside.
     """
-    blocks = (len(places) + MESH_LANES - 1) // MESH_LANES
-    for block in prange(blocks):
+    x, y = np.empty((3, MESH_LANES)), np.empty((3, MESH_LANES), np.float32)
+    squares, sums = np.empty((len(table), MESH_LANES), np.float32), np.empty((8, MESH_LANES), np.float32)
+    totals, away, part = np.empty((8, MESH_LANES)), np.empty(MESH_LANES), np.empty((4, MESH_LANES))
+    some, lanes = np.empty((3, MESH_LANES)), np.empty(MESH_LANES, np.intp)
+    for block in range(begin, end):
         first = np.intp(block) * MESH_LANES
-        x, y = np.empty((3, MESH_LANES)), np.empty((3, MESH_LANES), np.float32)
-        squares, sums = np.empty((len(table), MESH_LANES), np.float32), np.empty((8, MESH_LANES), np.float32)
-        totals, away, part = np.empty((8, MESH_LANES)), np.empty(MESH_LANES), np.empty((4, MESH_LANES))
-        some, lanes = np.empty((3, MESH_LANES)), np.empty(MESH_LANES, np.intp)
         for l in range(MESH_LANES):
             row = min(first + l, len(places) - 1)
             for n in range(3):

@@ -19,9 +19,9 @@ from __future__ import annotations
 
 import numba as nb
 import numpy as np
-from numba import prange
 
 from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 from cagefield.rendering.splats.kernels.projection import ALPHA_MAX, ALPHA_MIN, AREA, TILE_PX
 
 F, U = np.float32, np.uint64
@@ -146,11 +146,11 @@ def blend_normals_tile(state, packed, ids, begin, end, x0, y0):
             state[i] -= w
 
 
-@njit(parallel=True, **FAST)
-def blend(packed, ids, starts, across, channels, stops, out):
+@parallel_njit(lambda packed, ids, starts, *_: starts.size - 1, **FAST)
+def blend(begin, end, packed, ids, starts, across, channels, stops, out):
     """Blends all tiles into out [tiles, channels, AREA]: T, colour (3), depth (of 5), normals (of 8)."""
-    for t in prange(starts.size - 1):
-        state = np.empty(ROWS * AREA, nb.float32)
+    state = np.empty(ROWS * AREA, nb.float32)
+    for t in range(begin, end):
         coordinates(state)
         x0, y0 = (t % across) * TILE_PX, (t // across) * TILE_PX
         stop = blend_tile(state, packed, ids, starts[t], starts[t + 1], x0, y0, channels > 4)
@@ -266,8 +266,10 @@ def gradient_tile(state, packed, ids, begin, end, x0, y0, sums):
         m[19] = s19
 
 
-@njit(parallel=True, **FAST)
-def gradients(packed, ids, starts, stops, width, height, color, slopes, weights, empty, veil, sums):
+@parallel_njit(lambda packed, ids, starts, *_: starts.size - 1, **FAST)
+def gradients(
+    begin, end, packed, ids, starts, stops, width, height, color, slopes, weights, empty, veil, sums
+):
     """The sums of all pairs [pairs, SUMS]: colour [tiles,3,AREA] is the picture, slopes dL/d(picture).
 
     `weights` [tiles,AREA] scale the slopes; pixels of weight 0 count for nothing, nor does their curvature.
@@ -275,8 +277,8 @@ def gradients(packed, ids, starts, stops, width, height, color, slopes, weights,
     is nothing, and how sure that is; each alpha of a splat before them costs that times `veil`.
     """
     across = (width + TILE_PX - 1) // TILE_PX
-    for t in prange(starts.size - 1):
-        state = np.empty(ROWS * AREA, nb.float32)
+    state = np.empty(ROWS * AREA, nb.float32)
+    for t in range(begin, end):
         coordinates(state)
         x0, y0 = (t % across) * TILE_PX, (t // across) * TILE_PX
         for i in range(AREA):
@@ -307,10 +309,10 @@ def gradients(packed, ids, starts, stops, width, height, color, slopes, weights,
                 sums[e, j] = ZERO
 
 
-@njit(parallel=True, **FAST)
-def opacity_before(packed, ids, starts, across, pixels, distances, out):
+@parallel_njit(lambda *args: len(args[-1]), **FAST)
+def opacity_before(begin, end, packed, ids, starts, across, pixels, distances, out):
     """Opacity [K] that rays through pixels [K,2] (x, y, centres at .5) have gathered before distances [K]."""
-    for n in prange(pixels.shape[0]):
+    for n in range(begin, end):
         x, y = pixels[n, 0] - HALF, pixels[n, 1] - HALF
         t = int(pixels[n, 1]) // TILE_PX * across + int(pixels[n, 0]) // TILE_PX
         through = ONE

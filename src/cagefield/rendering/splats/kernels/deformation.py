@@ -12,15 +12,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import prange
 
 from cagefield.compute.numba_cache import njit
+from cagefield.compute.parallel_kernels import parallel_njit
 
 PLAIN: dict[str, Any] = {"error_model": "numpy", "cache": True}
 """Options of every kernel: rounding matters to covariances of flat splats, so no `fastmath`."""
-
-BLOCK = 1024
-"""Splats that a thread takes at a time."""
 
 ROUNDING = 2e-7
 """Increment of the variances, as a share of the largest one: above the float32 rounding error of the
@@ -28,10 +25,10 @@ smallest,
 so that the covariance of a flat splat stays positive."""
 
 
-@njit(parallel=True, **PLAIN)
-def in_boxes(points, boxes, inside):
+@parallel_njit(lambda points, *_: len(points), **PLAIN)
+def in_boxes(begin, end, points, boxes, inside):
     """Writes which points [N,3] lie in one of the boxes [B,2,3]."""
-    for n in prange(len(points)):
+    for n in range(begin, end):
         x, y, z = points[n, 0], points[n, 1], points[n, 2]
         found = False
         for b in range(len(boxes)):
@@ -54,26 +51,26 @@ def reaches(x, y, z, log_scales, n, stretch, low, high, reach, least):
     return found and width > least
 
 
-@njit(parallel=True, **PLAIN)
-def within_reach(points, numbers, log_scales, low, high, reach, least, stretch, found):
+@parallel_njit(lambda points, *_: len(points), **PLAIN)
+def within_reach(begin, end, points, numbers, log_scales, low, high, reach, least, stretch, found):
     """Writes which points [M,3] an edit in a box may bend or cut: splats `numbers` [M], stretched [M]."""
-    for m in prange(len(points)):
+    for m in range(begin, end):
         x, y, z = points[m, 0], points[m, 1], points[m, 2]
         found[m] = reaches(x, y, z, log_scales, numbers[m], stretch[m], low, high, reach, least)
 
 
-@njit(parallel=True, **PLAIN)
-def within_reach_at_rest(means, left, log_scales, low, high, reach, least, stretch, found):
+@parallel_njit(lambda means, *_: len(means), **PLAIN)
+def within_reach_at_rest(begin, end, means, left, log_scales, low, high, reach, least, stretch, found):
     """Mark splats [N] within reach at their canonical positions, except those that have left them."""
-    for n in prange(len(means)):
+    for n in range(begin, end):
         x, y, z = float(means[n, 0]), float(means[n, 1]), float(means[n, 2])
         found[n] = not left[n] and reaches(x, y, z, log_scales, n, stretch, low, high, reach, least)
 
 
-@njit(parallel=True, **PLAIN)
-def changes(points, ends, jacobian, moves):
+@parallel_njit(lambda points, *_: len(points), **PLAIN)
+def changes(begin, end, points, ends, jacobian, moves):
     """Writes which points [M,3] end elsewhere, or have a Jacobian [M,3,3] that is not 1."""
-    for m in prange(len(points)):
+    for m in range(begin, end):
         same = True
         for a in range(3):
             same &= points[m, a] == ends[m, a]
@@ -82,14 +79,13 @@ def changes(points, ends, jacobian, moves):
         moves[m] = not same
 
 
-@njit(parallel=True, **PLAIN)
-def gather(values, rows, out):
+@parallel_njit(lambda values, rows, out: len(rows), **PLAIN)
+def gather(begin, end, values, rows, out):
     """Writes the rows of values [N,K] into out [M,K]."""
-    for block in prange((len(rows) + BLOCK - 1) // BLOCK):
-        for m in range(block * BLOCK, min(len(rows), (block + 1) * BLOCK)):
-            n = rows[m]
-            for k in range(values.shape[1]):
-                out[m, k] = values[n, k]
+    for m in range(begin, end):
+        n = rows[m]
+        for k in range(values.shape[1]):
+            out[m, k] = values[n, k]
 
 
 @njit(**PLAIN)
@@ -135,69 +131,68 @@ def polar_rotation(J, R):
             return
 
 
-@njit(parallel=True, **PLAIN)
-def deform(source, jacobian, quaternions, log_scales, covariances, rotations, growth):
+@parallel_njit(lambda source, *_: len(source), **PLAIN)
+def deform(begin, end, source, jacobian, quaternions, log_scales, covariances, rotations, growth):
     """Write the deformation by J [M,3,3] of the splats with indices `source` [M].
 
     covariances [M,6] float32 (xx, xy, xz, yy, yz, zz); rotations [M,3,3] float32, R; growth [M],
     |det J|^(1/3).
     """
-    for block in prange((len(source) + BLOCK - 1) // BLOCK):
-        Q, A = np.empty((3, 3)), np.empty((3, 3))
-        for m in range(block * BLOCK, min(len(source), (block + 1) * BLOCK)):
-            n = source[m]
-            J = jacobian[m]
-            w, x, y, z = (
-                float(quaternions[n, 0]),
-                float(quaternions[n, 1]),
-                float(quaternions[n, 2]),
-                float(quaternions[n, 3]),
-            )
-            Q[0, 0], Q[0, 1], Q[0, 2] = (
-                1.0 - 2.0 * (y * y + z * z),
-                2.0 * (x * y - w * z),
-                2.0 * (x * z + w * y),
-            )
-            Q[1, 0], Q[1, 1], Q[1, 2] = (
-                2.0 * (x * y + w * z),
-                1.0 - 2.0 * (x * x + z * z),
-                2.0 * (y * z - w * x),
-            )
-            Q[2, 0], Q[2, 1], Q[2, 2] = (
-                2.0 * (x * z - w * y),
-                2.0 * (y * z + w * x),
-                1.0 - 2.0 * (x * x + y * y),
-            )
-            for j in range(3):
-                s = np.exp(float(log_scales[n, j]))
-                for i in range(3):
-                    A[i, j] = s * (J[i, 0] * Q[0, j] + J[i, 1] * Q[1, j] + J[i, 2] * Q[2, j])
-            xx = A[0, 0] ** 2 + A[0, 1] ** 2 + A[0, 2] ** 2
-            yy = A[1, 0] ** 2 + A[1, 1] ** 2 + A[1, 2] ** 2
-            zz = A[2, 0] ** 2 + A[2, 1] ** 2 + A[2, 2] ** 2
-            slack = ROUNDING * max(xx, yy, zz)
-            covariances[m, 0] = xx + slack
-            covariances[m, 1] = A[0, 0] * A[1, 0] + A[0, 1] * A[1, 1] + A[0, 2] * A[1, 2]
-            covariances[m, 2] = A[0, 0] * A[2, 0] + A[0, 1] * A[2, 1] + A[0, 2] * A[2, 2]
-            covariances[m, 3] = yy + slack
-            covariances[m, 4] = A[1, 0] * A[2, 0] + A[1, 1] * A[2, 1] + A[1, 2] * A[2, 2]
-            covariances[m, 5] = zz + slack
-            det = (
-                J[0, 0] * (J[1, 1] * J[2, 2] - J[1, 2] * J[2, 1])
-                - J[0, 1] * (J[1, 0] * J[2, 2] - J[1, 2] * J[2, 0])
-                + J[0, 2] * (J[1, 0] * J[2, 1] - J[1, 1] * J[2, 0])
-            )
-            growth[m] = abs(det) ** (1.0 / 3.0)
-            polar_rotation(J, Q)
+    Q, A = np.empty((3, 3)), np.empty((3, 3))
+    for m in range(begin, end):
+        n = source[m]
+        J = jacobian[m]
+        w, x, y, z = (
+            float(quaternions[n, 0]),
+            float(quaternions[n, 1]),
+            float(quaternions[n, 2]),
+            float(quaternions[n, 3]),
+        )
+        Q[0, 0], Q[0, 1], Q[0, 2] = (
+            1.0 - 2.0 * (y * y + z * z),
+            2.0 * (x * y - w * z),
+            2.0 * (x * z + w * y),
+        )
+        Q[1, 0], Q[1, 1], Q[1, 2] = (
+            2.0 * (x * y + w * z),
+            1.0 - 2.0 * (x * x + z * z),
+            2.0 * (y * z - w * x),
+        )
+        Q[2, 0], Q[2, 1], Q[2, 2] = (
+            2.0 * (x * z - w * y),
+            2.0 * (y * z + w * x),
+            1.0 - 2.0 * (x * x + y * y),
+        )
+        for j in range(3):
+            s = np.exp(float(log_scales[n, j]))
             for i in range(3):
-                for j in range(3):
-                    rotations[m, i, j] = Q[i, j]
+                A[i, j] = s * (J[i, 0] * Q[0, j] + J[i, 1] * Q[1, j] + J[i, 2] * Q[2, j])
+        xx = A[0, 0] ** 2 + A[0, 1] ** 2 + A[0, 2] ** 2
+        yy = A[1, 0] ** 2 + A[1, 1] ** 2 + A[1, 2] ** 2
+        zz = A[2, 0] ** 2 + A[2, 1] ** 2 + A[2, 2] ** 2
+        slack = ROUNDING * max(xx, yy, zz)
+        covariances[m, 0] = xx + slack
+        covariances[m, 1] = A[0, 0] * A[1, 0] + A[0, 1] * A[1, 1] + A[0, 2] * A[1, 2]
+        covariances[m, 2] = A[0, 0] * A[2, 0] + A[0, 1] * A[2, 1] + A[0, 2] * A[2, 2]
+        covariances[m, 3] = yy + slack
+        covariances[m, 4] = A[1, 0] * A[2, 0] + A[1, 1] * A[2, 1] + A[1, 2] * A[2, 2]
+        covariances[m, 5] = zz + slack
+        det = (
+            J[0, 0] * (J[1, 1] * J[2, 2] - J[1, 2] * J[2, 1])
+            - J[0, 1] * (J[1, 0] * J[2, 2] - J[1, 2] * J[2, 0])
+            + J[0, 2] * (J[1, 0] * J[2, 1] - J[1, 1] * J[2, 0])
+        )
+        growth[m] = abs(det) ** (1.0 / 3.0)
+        polar_rotation(J, Q)
+        for i in range(3):
+            for j in range(3):
+                rotations[m, i, j] = Q[i, j]
 
 
-@njit(parallel=True, **PLAIN)
-def times(jacobian, before):
+@parallel_njit(lambda jacobian, before: len(jacobian), **PLAIN)
+def times(begin, end, jacobian, before):
     """Writes J J_0 into J [M,3,3], for J_0 [M,3,3] of the maps before."""
-    for m in prange(len(jacobian)):
+    for m in range(begin, end):
         for i in range(3):
             a, b, c = jacobian[m, i, 0], jacobian[m, i, 1], jacobian[m, i, 2]
             for j in range(3):

@@ -22,9 +22,9 @@ from __future__ import annotations
 
 import numba as nb
 import numpy as np
-from numba import prange
 
 from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 from cagefield.rendering.splats.kernels.blending import (
     AREA,
     HALF,
@@ -70,8 +70,8 @@ def interval(a, b, p, az, bz, pz, reach):
     return xz / zz, np.sqrt(max(0.0, xz * xz - xx * zz)) / -zz
 
 
-@njit(parallel=True, **FAST)
-def project(discs, normals, camera, projected):
+@parallel_njit(lambda discs, *_: len(discs.means), **FAST)
+def project(begin, end, discs, normals, camera, projected):
     """Write the `ProjectedSplats` of the `DiscArgs` as seen by the `CameraArgs`.
 
     packed [N,16]: 0-1 mean (pixel centers at whole numbers), 2-4 A, k, D, 5 opacity, 6-8 color, 9
@@ -84,7 +84,8 @@ def project(discs, normals, camera, projected):
     across = (size[0] + TILE_PX - 1) // TILE_PX
     down = (size[1] + TILE_PX - 1) // TILE_PX
     terms = sh.shape[1]
-    for i in prange(means.shape[0]):
+    basis = np.empty(MAX_TERMS)
+    for i in range(begin, end):
         tiles[i, 0] = 0
         tiles[i, 1] = 0
         dx = np.float64(means[i, 0]) - origin[0]
@@ -175,7 +176,6 @@ def project(discs, normals, camera, projected):
             ty = R[0, 1] * ex + R[1, 1] * ey + R[2, 1] * ez
             tz = R[0, 2] * ex + R[1, 2] * ey + R[2, 2] * ez
             ex, ey, ez = tx, ty, tz
-        basis = np.empty(MAX_TERMS)
         harmonics_at(ex, ey, ez, terms, basis)
         for ch in range(3):
             color = 0.5
@@ -248,11 +248,11 @@ def blend_normals_tile(state, packed, ids, begin, end, x0, y0, near):
             state[i] -= w
 
 
-@njit(parallel=True, **FAST)
-def blend(packed, ids, starts, across, near, channels, out):
+@parallel_njit(lambda packed, ids, starts, *_: starts.size - 1, **FAST)
+def blend(begin, end, packed, ids, starts, across, near, channels, out):
     """Blends all tiles into out [tiles, channels, AREA]: T, colour (3), depth z (of 5), normals (of 8)."""
-    for t in prange(starts.size - 1):
-        state = np.empty(ROWS * AREA, nb.float32)
+    state = np.empty(ROWS * AREA, nb.float32)
+    for t in range(begin, end):
         coordinates(state)
         x0, y0 = (t % across) * TILE_PX, (t // across) * TILE_PX
         stop = blend_tile(state, packed, ids, starts[t], starts[t + 1], x0, y0, near)
@@ -266,10 +266,10 @@ def blend(packed, ids, starts, across, near, channels, out):
                     out[t, 5 + ch, i] = state[(ch + 1) * AREA + i]
 
 
-@njit(parallel=True, **FAST)
-def opacity_before(packed, ids, starts, across, near, pixels, depths, out):
+@parallel_njit(lambda *args: len(args[-1]), **FAST)
+def opacity_before(begin, end, packed, ids, starts, across, near, pixels, depths, out):
     """Opacity [K] that rays through pixels [K,2] (x, y, centres at .5) have gathered before depths z [K]."""
-    for n in prange(pixels.shape[0]):
+    for n in range(begin, end):
         x, y = pixels[n, 0] - HALF, pixels[n, 1] - HALF
         t = int(pixels[n, 1]) // TILE_PX * across + int(pixels[n, 0]) // TILE_PX
         through = ONE

@@ -18,9 +18,9 @@ Real-Time Radiance Field Rendering" (2023), equation 5; Yu et al., "Mip-Splattin
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
 from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 from cagefield.fields import sh as harmonics
 
 TILE_PX = 16
@@ -146,8 +146,8 @@ def harmonics_at(x, y, z, terms, basis):
         basis[24] = C48 * (x * x * (x * x - 3.0 * y * y) - y * y * (3.0 * x * x - y * y))
 
 
-@njit(parallel=True, **FAST)
-def project(splats, normals, masses, depths, rows, camera, antialiased, projected):
+@parallel_njit(lambda splats, normals, masses, depths, rows, *_: rows.size, **FAST)
+def project(begin, end, splats, normals, masses, depths, rows, camera, antialiased, projected):
     """Write the `ProjectedSplats` of `rows` of the `SplatArgs` as seen by the `CameraArgs`.
 
     `normals` [N,3] has no rows where none are wanted. Splats that are not shown get an empty box of tiles.
@@ -167,7 +167,9 @@ def project(splats, normals, masses, depths, rows, camera, antialiased, projecte
     with_normals = normals.shape[0] > 0
     merged = masses.shape[0] > 0
     terms = sh.shape[1]
-    for q in prange(rows.size):
+    M = np.empty((2, 3))
+    basis = np.empty(MAX_TERMS)
+    for q in range(begin, end):
         i = rows[q]
         tiles[i, 0] = 0
         tiles[i, 1] = 0
@@ -182,7 +184,6 @@ def project(splats, normals, masses, depths, rows, camera, antialiased, projecte
         y = W[1, 0] * dx + W[1, 1] * dy + W[1, 2] * dz
         if x * x + y * y > radius_limit * radius_limit * z * z:
             continue
-        M = np.empty((2, 3))
         jacobian(x, y, z, W, fx, fy, limits, model, coefficients, M)
         C = covariances[i]
         if not C[0] + C[3] + C[5] < MAX_WORLD_VARIANCE:
@@ -251,7 +252,6 @@ def project(splats, normals, masses, depths, rows, camera, antialiased, projecte
             ty = R[0, 1] * ex + R[1, 1] * ey + R[2, 1] * ez
             tz = R[0, 2] * ex + R[1, 2] * ey + R[2, 2] * ez
             ex, ey, ez = tx, ty, tz
-        basis = np.empty(MAX_TERMS)
         harmonics_at(ex, ey, ez, terms, basis)
         for ch in range(3):
             color = 0.5

@@ -18,9 +18,9 @@ equations 3 to 6; the optical depth derived here.
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
 from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 from cagefield.rendering.splats.kernels.projection import ALPHA_MAX, ALPHA_MIN, MAX_WORLD_VARIANCE
 
 CLUSTER_FLOATS = 7
@@ -51,10 +51,10 @@ def area(c):
     return np.sqrt(max(minors, 1e-60))
 
 
-@njit(parallel=True, **FAST)
-def codes(means, low, scale, out):
+@parallel_njit(lambda means, *_: len(means), **FAST)
+def codes(begin, end, means, low, scale, out):
     """Morton codes [N] of means [N,3], 10 bits an axis, of (mean - low) scale."""
-    for i in prange(means.shape[0]):
+    for i in range(begin, end):
         code = np.uint32(0)
         for axis in range(3):
             cell = np.uint32(min(1023.0, max(0.0, (means[i, axis] - low[axis]) * scale[axis])))
@@ -66,11 +66,13 @@ def codes(means, low, scale, out):
         out[i] = code
 
 
-@njit(parallel=True, **FAST)
-def boxes(means, covariances, opacities, order, size, out):
+@parallel_njit(lambda *args: len(args[-1]), **FAST)
+def boxes(begin, end, means, covariances, opacities, order, size, out):
     """Writes the boxes [clusters,CLUSTER_FLOATS] of each `size` splats of `order`."""
-    for k in prange(out.shape[0]):
-        low, high = np.full(3, 1e30), np.full(3, -1e30)
+    low, high = np.empty(3), np.empty(3)
+    for k in range(begin, end):
+        for axis in range(3):
+            low[axis], high[axis] = 1e30, -1e30
         reach = 0.0
         for q in range(k * size, min((k + 1) * size, order.size)):
             i = order[q]
@@ -102,16 +104,16 @@ def farthest(box, direction):
     return total
 
 
-@njit(parallel=True, **FAST)
-def seen(boxes, origin, W, planes, reaches, near, out):
+@parallel_njit(lambda boxes, *_: len(boxes), **FAST)
+def seen(begin, end, boxes, origin, W, planes, reaches, near, out):
     """Writes the least depth of each cluster that the camera may see, or -1.
 
     A cluster is out of sight where all its splats are nearer than `near`, or for one of the `planes` [P,3]
     (world axes, from the camera) p . (x - origin) < -reaches[p] times its reach.
     """
-    for k in prange(boxes.shape[0]):
+    box = np.empty(6)
+    for k in range(begin, end):
         out[k] = -1.0
-        box = np.empty(6)
         for j in range(3):
             box[j] = boxes[k, j] - origin[j]
             box[3 + j] = boxes[k, 3 + j]
@@ -135,8 +137,8 @@ def rows_of(chosen, order, size, out):
     return n
 
 
-@njit(parallel=True, **FAST)
-def merge(splats, masses, order, size, merged):
+@parallel_njit(lambda *args: len(args[-1].means), **FAST)
+def merge(begin, end, splats, masses, order, size, merged):
     """Write the `MergedSplats` of each `size` consecutive elements of `order` of the `SplatArgs`.
 
     masses [N,2] of the merged elements: sum of w over its own area, sum of Li2(o), or no rows for splats.
@@ -146,12 +148,19 @@ def merge(splats, masses, order, size, merged):
     out_means, out_covariances, out_sh, out_rotations, out_masses, out_apart = merged
     terms = sh.shape[1]
     turned = rotations.shape[0] > 0
-    for g in prange(out_means.shape[0]):
-        mean, C, spread, own = np.zeros(3), np.zeros(6), np.zeros(6), np.empty(6)
-        color = np.zeros((terms, 3))
+    mean, C, spread, own = np.empty(3), np.empty(6), np.empty(6), np.empty(6)
+    color = np.empty((terms, 3))
+    first = np.empty(3)
+    for g in range(begin, end):
+        for j in range(3):
+            mean[j] = 0.0
+        for j in range(6):
+            C[j] = spread[j] = 0.0
+        for j in range(terms):
+            for ch in range(3):
+                color[j, ch] = 0.0
         mass = count = most = 0.0
         heaviest = order[g * size]
-        first = np.empty(3)
         for j in range(3):
             first[j] = means[heaviest, j]
         for q in range(g * size, min((g + 1) * size, order.size)):
@@ -213,10 +222,10 @@ def merge(splats, masses, order, size, merged):
                     out_rotations[g, m, n] = rotations[heaviest, m, n]
 
 
-@njit(parallel=True, **FAST)
-def spreads(apart, size, out):
+@parallel_njit(lambda *args: args[-1].size, **FAST)
+def spreads(begin, end, apart, size, out):
     """Writes the root mean square of each `size` values."""
-    for k in prange(out.size):
+    for k in range(begin, end):
         total, number = 0.0, 0
         for g in range(k * size, min((k + 1) * size, apart.size)):
             total += np.float64(apart[g]) * apart[g]

@@ -18,10 +18,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 from cagefield.rendering.splats.kernels.projection import AREA, MAX_TERMS, TILE_PX, harmonics_at
 from cagefield.typing import Array, Float32
 
@@ -67,8 +67,8 @@ class StepArgs(NamedTuple):
     pull: float
 
 
-@njit(parallel=True, **FAST)
-def residuals(out, target, width, height, gain, background, weights, color, slopes, sums):
+@parallel_njit(lambda out, *_: len(out), **FAST)
+def residuals(begin, end, out, target, width, height, gain, background, weights, color, slopes, sums):
     """Write the composited image, dL/d(image) of L = |gain image - photo|^2 / 2, and sums per tile.
 
     out [tiles, >=4, AREA] is T and color; target [tiles, 3 or 4, AREA] uint8 with straight alpha. sums
@@ -77,7 +77,7 @@ def residuals(out, target, width, height, gain, background, weights, color, slop
     """
     across = (width + TILE_PX - 1) // TILE_PX
     alpha = target.shape[1] == 4
-    for t in prange(out.shape[0]):
+    for t in range(begin, end):
         x0, y0 = (t % across) * TILE_PX, (t // across) * TILE_PX
         for j in range(7):
             sums[t, j] = 0.0
@@ -148,8 +148,8 @@ def clamp_size(value, cap):
     return min(cap, max(-cap, value))
 
 
-@njit(parallel=True, **FAST)
-def gauss_newton(order, gradients, curvatures, parameters, origin, averages, step):
+@parallel_njit(lambda order, *_: order.size, **FAST)
+def gauss_newton(begin, end, order, gradients, curvatures, parameters, origin, averages, step):
     """Take one step of the splats in `order`, seen from `origin` [3].
 
     `parameters` are `splat_backward.ParameterArgs`, `averages` `AverageArgs`, `step` `StepArgs`.
@@ -157,7 +157,9 @@ def gauss_newton(order, gradients, curvatures, parameters, origin, averages, ste
     means, log_scales, quaternions, logits, sh = parameters
     momentum, running, ticks = averages
     memory, rates, damping, caps, terms, scale_range, pull = step
-    for q in prange(order.size):
+    H = np.empty(17)
+    basis = np.empty(MAX_TERMS)
+    for q in range(begin, end):
         i = order[q]
         ticks[i] += 1
         t = 1.0 / ticks[i]
@@ -165,7 +167,6 @@ def gauss_newton(order, gradients, curvatures, parameters, origin, averages, ste
         new2 = max(1.0 - memory[1], t)
         g = momentum[i]
         memory_H = running[i]
-        H = np.empty(17)
         for j in range(16):
             memory_H[j] += new2 * (curvatures[i, j] - memory_H[j])
             H[j] = memory_H[j] + CURRENT_CURVATURE_SHARE * curvatures[i, j]
@@ -202,7 +203,6 @@ def gauss_newton(order, gradients, curvatures, parameters, origin, averages, ste
         dy = np.float64(means[i, 1]) - origin[1]
         dz = np.float64(means[i, 2]) - origin[2]
         r = 1.0 / np.sqrt(dx * dx + dy * dy + dz * dz)
-        basis = np.empty(MAX_TERMS)
         harmonics_at(dx * r, dy * r, dz * r, terms, basis)
         norm = 0.0
         for j in range(terms):

@@ -11,9 +11,9 @@ Source: Collins, "A space-sweep approach to true multi-image matching" (1996); G
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
 from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 from cagefield.rendering.splats.kernels.projection import distort
 
 WINDOW_RADIUS_PIXELS = 2
@@ -67,19 +67,31 @@ def warp(image, directions, A, b, w, focal, center, model, coefficients, out, in
                     inside[y, x] = np.float32(1.0)
 
 
-@njit(parallel=True, **FAST)
+@parallel_njit(lambda images, *_: len(images), **FAST)
 def sweep(
-    images, directions, rotations, origins, focals, centers, models, coefficients, neighbors, inverse, out
+    begin,
+    end,
+    images,
+    directions,
+    rotations,
+    origins,
+    focals,
+    centers,
+    models,
+    coefficients,
+    neighbors,
+    inverse,
+    out,
 ):
     """Write out [V,H,W,3]: fractional index of the best inverse depth, its score, the best score elsewhere.
 
     images [V,H,W] float32; directions [V,H,W,2]; rotations [V,3,3] world to camera; origins [V,3]; neighbors
     [V,K]; inverse [V,D] inverse depths of each reference view, evenly spaced and increasing.
     """
-    views, height, width = images.shape
+    height, width = images.shape[1:]
     count = inverse.shape[1]
     K = neighbors.shape[1]
-    for r in prange(views):
+    for r in range(begin, end):
         reference = images[r]
         rows = np.empty((height, width), np.float32)
         warped = np.empty((height, width), np.float32)

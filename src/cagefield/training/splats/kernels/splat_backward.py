@@ -24,10 +24,10 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 from cagefield.rendering.splats.kernels.projection import (
     BLUR,
     LEAST_COMPENSATION,
@@ -87,9 +87,9 @@ def bilinear(a, b, c, x0, y0, x1, y1):
     return a * x0 * x1 + b * (x0 * y1 + y0 * x1) + c * y0 * y1
 
 
-@njit(parallel=True, **FAST)
+@parallel_njit(lambda pairs, *_: pairs.order.size, **FAST)
 def backpropagate(
-    pairs, packed, parameters, opacities, camera, antialiased, directional, gradients, curvatures
+    begin, end, pairs, packed, parameters, opacities, camera, antialiased, directional, gradients, curvatures
 ):
     """Write gradients [N,GRADIENT_FLOATS] and curvatures [N,CURVATURE_FLOATS] of the splats in `pairs`.
 
@@ -102,9 +102,18 @@ def backpropagate(
     W, origin, focal, _, _, limits, model, coefficients, _, _ = camera
     fx, fy = focal[0], focal[1]
     terms = sh.shape[1]
-    for q in prange(order.size):
+    s = np.empty(20)
+    M = np.empty((2, 3))
+    R = np.empty((3, 3))
+    k = np.empty((2, 3))
+    s2 = np.empty(3)
+    C = np.empty((3, 3))
+    P = np.empty((2, 3))
+    kappa = np.empty(3)
+    spread = np.empty(3)
+    for q in range(begin, end):
         i = order[q]
-        s = np.zeros(20)
+        s[:] = 0.0
         for e in range(firsts[q], firsts[q + 1]):
             for j in range(20):
                 s[j] += sums[slots[e], j]
@@ -120,14 +129,12 @@ def backpropagate(
         nx = clamped(x * iz, limits[0], limits[1])
         ny = clamped(y * iz, limits[2], limits[3])
         _, _, d00, d01, d10, d11 = distort(nx, ny, model, coefficients)
-        M = np.empty((2, 3))
         for j in range(3):
             px = (W[0, j] - nx * W[2, j]) * iz
             py = (W[1, j] - ny * W[2, j]) * iz
             M[0, j] = fx * (d00 * px + d01 * py)
             M[1, j] = fy * (d10 * px + d11 * py)
         w, a, b, c = quaternions[i, 0], quaternions[i, 1], quaternions[i, 2], quaternions[i, 3]
-        R = np.empty((3, 3))
         R[0, 0] = 1.0 - 2.0 * (b * b + c * c)
         R[0, 1] = 2.0 * (a * b - w * c)
         R[0, 2] = 2.0 * (a * c + w * b)
@@ -137,8 +144,6 @@ def backpropagate(
         R[2, 0] = 2.0 * (a * c - w * b)
         R[2, 1] = 2.0 * (b * c + w * a)
         R[2, 2] = 1.0 - 2.0 * (a * a + b * b)
-        k = np.empty((2, 3))
-        s2 = np.empty(3)
         for j in range(3):
             s2[j] = np.exp(2.0 * log_scales[i, j])
             for m in range(2):
@@ -170,7 +175,7 @@ def backpropagate(
         G[14] = s[9]
         G[15] = s[19]
         # The mean, through M: D2 = dL/dM = 2 G M C.
-        C = np.zeros((3, 3))
+        C[:] = 0.0
         for m in range(3):
             for n in range(3):
                 for j in range(3):
@@ -222,7 +227,6 @@ def backpropagate(
         # The mean, through its projection, where n is not clamped.
         if not (free_x and free_y):
             _, _, d00, d01, d10, d11 = distort(x * iz, y * iz, model, coefficients)
-        P = np.empty((2, 3))
         for j in range(3):
             px = (W[0, j] - x * iz * W[2, j]) * iz
             py = (W[1, j] - y * iz * W[2, j]) * iz
@@ -236,8 +240,6 @@ def backpropagate(
             for n in range(m, 3):
                 H[at] = bilinear(s[11], s[12], s[13], P[0, m], P[1, m], P[0, n], P[1, n])
                 at += 1
-        kappa = np.empty(3)
-        spread = np.empty(3)
         for j in range(3):
             kappa[j] = s2[j] * bilinear(K0, K1, K2, k[0, j], k[1, j], k[0, j], k[1, j])
             spread[j] = s2[j] * bilinear(s[11], s[12], s[13], k[0, j], k[1, j], k[0, j], k[1, j])
@@ -298,12 +300,12 @@ def add_direction(i, dx, dy, dz, s, packed, sh, terms, G):
     G[2] += r * (slope[2] - along * ez)
 
 
-@njit(parallel=True, **FAST)
-def build_covariances(log_scales, quaternions, logits, covariances, opacities):
+@parallel_njit(lambda log_scales, *_: len(log_scales), **FAST)
+def build_covariances(begin, end, log_scales, quaternions, logits, covariances, opacities):
     """Write covariances [N,6] and opacities [N] of the parameters."""
-    for i in prange(log_scales.shape[0]):
+    R = np.empty((3, 3), nb.float32)
+    for i in range(begin, end):
         w, a, b, c = quaternions[i, 0], quaternions[i, 1], quaternions[i, 2], quaternions[i, 3]
-        R = np.empty((3, 3), nb.float32)
         R[0, 0] = 1.0 - 2.0 * (b * b + c * c)
         R[0, 1] = 2.0 * (a * b - w * c)
         R[0, 2] = 2.0 * (a * c + w * b)

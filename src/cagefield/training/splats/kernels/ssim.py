@@ -9,11 +9,15 @@ equation 13; the derivative worked out here.
 
 from __future__ import annotations
 
-import numpy as np
-from numba import prange
+from typing import Any
 
-from cagefield.compute.numba_cache import FAST, njit
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.compute.numba_cache import FAST
+from cagefield.compute.parallel_kernels import parallel_njit
 from cagefield.rendering.splats.kernels.projection import TILE_PX
+from cagefield.typing import Float32
 
 WINDOW_PIXELS = 11
 """Side of a window; its Gaussian has a standard deviation of 1.5."""
@@ -28,19 +32,41 @@ WINDOW_WEIGHTS = (_GAUSSIAN / _GAUSSIAN.sum()).astype(np.float32)
 C1, C2 = np.float32(0.01**2), np.float32(0.03**2)
 
 
-@njit(parallel=True, **FAST)
 def add_ssim_gradient(
-    color, target, width, height, gain, background, weights, weight, moments, moment_slopes, pixels, slopes
-):
+    color: Float32,
+    target: NDArray[np.uint8],
+    gain: NDArray[Any],
+    background: NDArray[Any],
+    weights: Float32,
+    weight: float,
+    moments: Float32,
+    moment_slopes: Float32,
+    pixels: Float32,
+    slopes: Float32,
+) -> None:
     """Add `weight` times the loss's derivative by the image (before its gain) to `slopes`.
 
     color and slopes [tiles,3,AREA]; target [tiles, 3 or 4, AREA] uint8 with straight alpha over the
     background; gain and background [3]. Where `weights` [tiles,AREA] are 0 the photo counts as equal to the
     image. moments [3,MOMENT_PLANES,H,W], moment_slopes [3,3,H,W] and pixels [3,2,H,W] are scratch.
     """
+    _write_moments(color, target, gain, background, weights, pixels, moments)
+    _write_moment_slopes(moments, moment_slopes)
+    _add_slopes(moment_slopes, pixels, weight, gain, slopes)
+
+
+def _rows(*args: Any) -> int:
+    """Rows of the scratch image that is the last argument, of all channels."""
+    return int(args[-1].shape[0] * args[-1].shape[2])
+
+
+@parallel_njit(_rows, **FAST)
+def _write_moments(begin, end, color, target, gain, background, weights, pixels, moments):
+    """Writes image and photo into `pixels`, and their sums along the rows of windows into `moments`."""
+    height, width = moments.shape[2], moments.shape[3]
     across = (width + TILE_PX - 1) // TILE_PX
     alpha = target.shape[1] == 4
-    for row in prange(3 * height):
+    for row in range(begin, end):
         ch, y = row // height, row % height
         first = (y // TILE_PX) * across
         line = (y % TILE_PX) * TILE_PX
@@ -67,20 +93,27 @@ def add_ssim_gradient(
                 out[2, _HALF + i] += w * a * a
                 out[3, _HALF + i] += w * b * b
                 out[4, _HALF + i] += w * a * b
-    for row in prange(3 * height):
+
+
+@parallel_njit(_rows, **FAST)
+def _write_moment_slopes(begin, end, moments, moment_slopes):
+    """Writes the loss's derivatives by the moments, summed along the rows of windows."""
+    height, width = moments.shape[2], moments.shape[3]
+    sums, by = np.empty((MOMENT_PLANES, width), np.float32), np.empty((3, width), np.float32)
+    for row in range(begin, end):
         ch, y = row // height, row % height
         result = moment_slopes[ch, :, y]
         result[:] = np.float32(0)
         if y < _HALF or y >= height - _HALF:
             continue
-        sums = np.zeros((MOMENT_PLANES, width), np.float32)
+        sums[:] = np.float32(0)
         for k in range(WINDOW_PIXELS):
             w = WINDOW_WEIGHTS[k]
             for j in range(MOMENT_PLANES):
                 source = moments[ch, j, y + k - _HALF]
                 for i in range(width):
                     sums[j, i] += w * source[i]
-        by = np.zeros((3, width), np.float32)
+        by[:] = np.float32(0)
         for i in range(_HALF, width - _HALF):
             mx, my = sums[0, i], sums[1, i]
             a1 = np.float32(2) * mx * my + C1
@@ -103,9 +136,17 @@ def add_ssim_gradient(
             for j in range(3):
                 for i in range(width - 2 * _HALF):
                     result[j, i + k] += w * by[j, _HALF + i]
-    for row in prange(3 * height):
+
+
+@parallel_njit(lambda moment_slopes, *_: _rows(moment_slopes), **FAST)
+def _add_slopes(begin, end, moment_slopes, pixels, weight, gain, slopes):
+    """Adds the loss's derivatives by the image."""
+    height, width = moment_slopes.shape[2], moment_slopes.shape[3]
+    across = (width + TILE_PX - 1) // TILE_PX
+    total = np.empty((3, width), np.float32)
+    for row in range(begin, end):
         ch, y = row // height, row % height
-        total = np.zeros((3, width), np.float32)
+        total[:] = np.float32(0)
         for k in range(max(0, _HALF - y), min(WINDOW_PIXELS, height - y + _HALF)):
             w = WINDOW_WEIGHTS[k]
             for j in range(3):
