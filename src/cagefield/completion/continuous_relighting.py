@@ -77,28 +77,55 @@ class BentLight:
     light: LightChange
 
 
-def compute_bent_light(block: GridBlock, edit: Continuous, model: LightModel) -> BentLight:
+@dataclass(frozen=True, eq=False)
+class CanonicalLight:
+    """Light of a block in canonical space of a continuous edit, the same for all drags of its inner cage.
+
+    block: the coarse block; log [N] and log_diffuse [N] of its surfels `surface` [N].
+    """
+
+    block: GridBlock
+    surface: Surfels
+    log: Array
+    log_diffuse: Array
+
+    @classmethod
+    def from_block(cls, block: GridBlock, edit: Continuous, model: LightModel) -> CanonicalLight:
+        """Light of a block that reaches as far as the outer cage of an edit."""
+        coarse = block.pool(max(1, -(-max(block.shape) // MAX_VERTICES_PER_AXIS))).pad_to(edit.outer.aabb)
+        surface, _ = snap_to_planes(extract_surfels(coarse), max(coarse.spacing))
+        if not len(surface.points):
+            return cls(coarse, surface, np.zeros(0), np.zeros(0))
+        return cls(coarse, surface, model.log_light([surface], surface), model.log_diffuse(surface))
+
+
+def compute_bent_light(canonical: CanonicalLight, edit: Continuous, model: LightModel) -> BentLight:
     """Change of light of a block by a continuous edit."""
-    coarse = block.pool(max(1, -(-max(block.shape) // MAX_VERTICES_PER_AXIS))).pad_to(edit.outer.aabb)
-    surface, _ = snap_to_planes(extract_surfels(coarse), max(coarse.spacing))
+    coarse, surface = canonical.block, canonical.surface
     if not len(surface.points):
         return BentLight(coarse, surface, np.zeros(0), LightChange(np.zeros(coarse.shape, bool), np.zeros(0)))
     moved = to_deformed(edit.exact_warp, surface.points, coarse=True)
     bent = surface.transform(moved.points, moved.jacobian)
-    diffuse = model.log_diffuse(bent) - model.log_diffuse(surface)
-    log = model.log_light([bent], bent) - model.log_light([surface], surface)
+    diffuse = model.log_diffuse(bent) - canonical.log_diffuse
+    log = model.log_light([bent], bent) - canonical.log
     visible_log = np.where(np.abs(log) < MIN_BENT_LOG_CHANGE, 0.0, log)
     light = LightChange.from_surfels(coarse, surface, visible_log, 2.0 * max(coarse.spacing))
     return BentLight(coarse, surface, log - diffuse, light)
 
 
-def extract_bent_block(field: VoxelField, below: EditMap, edit: Continuous, model: LightModel) -> GridBlock:
+@dataclass(frozen=True, eq=False)
+class VoxelBlock:
+    """Block of a voxel field in which a continuous edit changes light, and its light before."""
+
+    block: GridBlock
+    canonical: CanonicalLight
+
+
+def extract_voxel_block(field: VoxelField, below: EditMap, edit: Continuous, model: LightModel) -> VoxelBlock:
     """Block of a voxel field, under the edits below, in which a continuous edit changes light."""
-    return extract_block(
-        field,
-        below,
-        light_box(edit, float(field.voxel_size.max()), model.max_radius, model.shadow_directions),
-    )
+    box = light_box(edit, float(field.voxel_size.max()), model.max_radius, model.shadow_directions)
+    block = extract_block(field, below, box)
+    return VoxelBlock(block, CanonicalLight.from_block(block, edit, model))
 
 
 def relight_voxels(
@@ -106,17 +133,17 @@ def relight_voxels(
     below: EditMap,
     edit: Continuous,
     model: LightModel,
-    block: GridBlock | None = None,
+    around: VoxelBlock | None = None,
     visibility: CameraVisibility | None = None,
 ) -> PreparedEdit | None:
     """Edit that changes the light of a voxel field under a continuous edit; None if no light changes.
 
-    `block` is its `extract_bent_block`, if that is known. With `fill` "surroundings" the support in deep
+    `around` is its `extract_voxel_block`, if that is known. With `fill` "surroundings" the support in deep
     shade is inpainted, except surfaces that cameras see by their `visibility` of the field without edits.
     """
     box = light_box(edit, float(field.voxel_size.max()), model.max_radius, model.shadow_directions)
-    block = block or extract_bent_block(field, below, edit, model)
-    bent = compute_bent_light(block, edit, model)
+    around = around or extract_voxel_block(field, below, edit, model)
+    block, bent = around.block, compute_bent_light(around.canonical, edit, model)
     relit = apply_bent_light(block, bent)[0]
     if edit.fill == "surroundings":
         relit = inpaint_shaded_support(relit, edit, bent, below, visibility)[0]
@@ -218,4 +245,5 @@ def light_edit(edit: Edit, patch: Patch | SplatPatch) -> PreparedEdit:
     """Edit that moves nothing and shows the patch with the light of another edit."""
     low, high = patch.region.aabb
     nothing = Cage.box(low, 1e-6 * (high - low))
-    return PreparedEdit(Edit.delete(nothing, name=edit.name, fill="none", relight="none"), patch)
+    removal = Edit.delete(nothing, name=edit.name, fill="none", relight="none")
+    return PreparedEdit(removal, patch, is_light=True)

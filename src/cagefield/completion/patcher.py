@@ -10,7 +10,12 @@ from functools import cached_property
 from typing import cast
 
 from cagefield.cameras.camera import Camera
-from cagefield.completion.continuous_relighting import extract_bent_block, light_edit, relight_voxels
+from cagefield.completion.continuous_relighting import (
+    VoxelBlock,
+    extract_voxel_block,
+    light_edit,
+    relight_voxels,
+)
 from cagefield.completion.detour_cache import DetourCache
 from cagefield.completion.discrete_patch import build_patch
 from cagefield.completion.lighting.ambient_occlusion import (
@@ -28,7 +33,6 @@ from cagefield.completion.splat_patch import (
     extract_splat_block,
     relight_splats,
 )
-from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.splat_voxelization import voxelize_bounds
 from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.completion.surfaces.visibility import CameraVisibility, render_visibility
@@ -79,7 +83,7 @@ class Patcher:
         self._cameras, self._render, self._pastes = cameras, render, pastes
         self._disk_cache = DiskCache(self._field, cameras)
         self._cache: OrderedDict[Key, Patch | SplatPatch | PreparedEdit | None] = OrderedDict()
-        self._light_block: tuple[Key, GridBlock | SplatBlock] | None = None
+        self._light_block: tuple[Key, VoxelBlock | SplatBlock] | None = None
         self._directional_models: dict[tuple[float, float, float] | None, LightModel] = {}
         self._composites: OrderedDict[Key, Pasted] = OrderedDict()
         self.detours = DetourCache(self._field)
@@ -320,8 +324,8 @@ class Patcher:
             known = self._light_block[1] if self._light_block and self._light_block[0] == block_key else None
             light: PreparedEdit | None
             if isinstance(self._content, VoxelField):
-                block = known if isinstance(known, GridBlock) else None
-                block = block or extract_bent_block(self._content, below, edit, model)
+                block = known if isinstance(known, VoxelBlock) else None
+                block = block or extract_voxel_block(self._content, below, edit, model)
                 light = relight_voxels(self._content, below, edit, model, block, self._visibility)
                 self._light_block = block_key, block
             else:

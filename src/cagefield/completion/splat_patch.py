@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.completion.continuous_relighting import (
+    CanonicalLight,
     apply_bent_light,
     compute_bent_light,
     inpaint_shaded_support,
@@ -113,13 +114,14 @@ def build_splat_patch(
 
 @dataclass(frozen=True, eq=False)
 class SplatBlock:
-    """Splats of a box [2,3], as the edits below place them, and the `block` of their density.
+    """Splats of a box [2,3], as the edits below place them, the `block` of their density, and its light.
 
     `known` are those splats with their colors, `scene` the field that patches name their sources in.
     """
 
     box: Array
     block: GridBlock
+    canonical: CanonicalLight
     known: KnownSplats
     scene: SplatField
 
@@ -137,7 +139,8 @@ def extract_splat_block(
     box = light_box(edit, voxel, model.max_radius, model.shadow_directions)
     grid = voxelize_splats(placed, box, voxel)
     known = KnownSplats.from_moved(field, placed, grid, moved)
-    return SplatBlock(box, extract_block(grid, EditStack(), box), known, splats.scene)
+    block = extract_block(grid, EditStack(), box)
+    return SplatBlock(box, block, CanonicalLight.from_block(block, edit, model), known, splats.scene)
 
 
 def relight_splats(
@@ -155,7 +158,7 @@ def relight_splats(
     around = around or extract_splat_block(splats, below, edit, model)
     block, known = around.block, around.known
     region = Cage.box(around.box.mean(axis=0), around.box[1] - around.box[0])
-    bent = compute_bent_light(block, edit, model)
+    bent = compute_bent_light(around.canonical, edit, model)
     relit, light = apply_bent_light(block, bent)
     new, is_new = NO_SPLATS, np.zeros(block.shape, bool)
     if edit.fill == "surroundings":

@@ -89,6 +89,11 @@ class SplatPatch:
         """None: splats have no layers."""
         return None
 
+    @property
+    def is_light_alone(self) -> bool:
+        """Whether no splat is taken away and none is new."""
+        return not len(self.sources) and not self.gone.any()
+
     def takes_away(self, points: Array) -> Mask:
         """[N], True for points [N,3] whose splats go."""
         if not self.gone.any():

@@ -26,12 +26,14 @@ class PreparedEdit:
     - pasted: of a paste, the content read from its source.
     - light: of a continuous edit, a patch in canonical space of the edit that changes the light before the
       edit moves anything.
+    - is_light: whether this is the `light` of an edit.
     """
 
     edit: Edit
     patch: Patch | SplatPatch | None = None
     pasted: Pasted | None = None
     light: PreparedEdit | None = None
+    is_light: bool = False
 
     @cached_property
     def steps(self) -> tuple[PreparedEdit, ...]:
@@ -40,6 +42,11 @@ class PreparedEdit:
         if not (self.edit.enabled and self.edit.changes_anything):
             return ()
         return (self,) if self.light is None else (self.light, replace(self, light=None))
+
+    @property
+    def is_light_alone(self) -> bool:
+        """Whether splats change in their light alone: the step of a continuous edit's light."""
+        return isinstance(self.patch, SplatPatch) and self.is_light and self.patch.is_light_alone
 
     @property
     def is_bare(self) -> bool:

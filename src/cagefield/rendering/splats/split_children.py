@@ -183,12 +183,13 @@ def shaded_children(
     inside = np.zeros(len(rows), bool) if isinstance(edit, Paste) else edit.inner.contains(points)
     change = np.zeros((len(rows), 3))
     steps = A.transpose(0, 2, 1)  # [M, axis, 3]
+    length = np.linalg.norm(steps, axis=2)
     for light, here in ((patch.light, ~inside), (patch.part, inside)):
         if light is not None:
-            along = [points[here, None] + way * steps[here] for way in (-1.0, 0.0, 1.0)]
-            change[here] = np.ptp([light.at(at.reshape(-1, 3)).reshape(-1, 3) for at in along], axis=0)
             # Splats smaller than a cell of the light's grid show its noise.
-            change[here] *= np.linalg.norm(steps[here], axis=2) > 0.5 * light.spacing.max()
+            long = here[:, None] & (length > 0.5 * light.spacing.max())
+            middle, step = points[np.nonzero(long)[0]], steps[long]
+            change[long] = np.ptp([light.at(middle + way * step) for way in (-1.0, 0.0, 1.0)], axis=0)
     return _rows(field, rows, change, SHADE)
 
 

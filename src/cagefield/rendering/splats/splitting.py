@@ -33,7 +33,8 @@ F(m) + J A z, which is right as far as F is affine over it, and in one colour. T
   the light's grid.
 
 Each child goes its own way then. Children are canonical splats; of edits in a stack, each splits the splats
-of those before it.
+of those before it. Steps of light alone come last, whatever their place in the stack: results of the others
+do not depend on them, and stay valid when light arrives (`_known_states`).
 
 Source: ours. For faint splats a cut has the moments of the truncated normal distribution: Johnson, Kotz and
 Balakrishnan, "Continuous Univariate Distributions" (1994), chapter 13.
@@ -117,38 +118,64 @@ def split_of(
     if not active:
         return None
     splats = SplatSet.from_field(splats).with_pastes(edits)
-    known = _known_splits(splats)
-    if known and known[0][0] == active:
-        return known[0][1]
-    most = (MOST - 1.0) * len(splats) + MORE
-    parents = np.zeros(len(splats), bool)
-    children: SplatSet | None = None
-    sources = np.zeros(0, np.int64)
-    for count, step in enumerate(active):
-        before = PreparedStack(active[:count])
-        parts: list[_Part] = []
-        if children is not None:
-            stay, others = _settled(children, before, step, None, most - len(children), proceed)
-            parts = [
-                (children.take(stay), sources[stay]),
-                *((part, sources[rows]) for part, rows in others),
-            ]
-        stay, others = _settled(
-            splats, before, step, parents, most - sum(len(part) for part, _ in parts), proceed
-        )
-        parents |= ~stay
-        parts += others
-        if parts:
-            children = SplatSet.concatenate([part for part, _ in parts])
-            sources = np.concatenate([rows for _, rows in parts])
-    split = None if children is None else Split(parents, children, sources)
-    known[:] = [(active, split)]
+    order = _splitting_order(active)
+    known = _known_states(splats)
+    shared = 0
+    while shared < min(len(known), len(order)) and known[shared][0] == order[shared]:
+        shared += 1
+    split = known[shared - 1][1] if shared else None
+    states = known[:shared]
+    for step, before in order[shared:]:
+        split = _split_by_step(splats, split, PreparedStack(before), step, proceed)
+        states.append(((step, before), split))
+    known[:] = states
     return split
 
 
+_Step = tuple[PreparedEdit, tuple[PreparedEdit, ...]]
+"""A step, and those that move the splats before it."""
+
+
+def _splitting_order(active: tuple[PreparedEdit, ...]) -> list[_Step]:
+    """The steps in the order in which they split: those of light alone last."""
+    moving = [
+        (step, tuple(other for other in active[:count] if not other.is_light_alone))
+        for count, step in enumerate(active)
+        if not step.is_light_alone
+    ]
+    return moving + [(step, active[:count]) for count, step in enumerate(active) if step.is_light_alone]
+
+
+def _split_by_step(
+    splats: SplatSet,
+    split: Split | None,
+    before: EditMap,
+    step: PreparedEdit,
+    proceed: Callable[[], None] | None,
+) -> Split | None:
+    """Split of a set after one more step, from that of those before."""
+    most = (MOST - 1.0) * len(splats) + MORE
+    parents = np.zeros(len(splats), bool) if split is None else split.parents
+    parts: list[_Part] = []
+    if split is not None:
+        children, sources = split.children, split.sources
+        stay, others = _settled(children, before, step, None, most - len(children), proceed)
+        parts = [(children.take(stay), sources[stay]), *((part, sources[rows]) for part, rows in others)]
+    room = most - sum(len(part) for part, _ in parts)
+    stay, others = _settled(splats, before, step, parents, room, proceed)
+    parts += others
+    if not parts:
+        return None
+    return Split(
+        parents | ~stay,
+        SplatSet.concatenate([part for part, _ in parts]),
+        np.concatenate([rows for _, rows in parts]),
+    )
+
+
 @memoized_weakly
-def _known_splits(splats: SplatSet) -> list[tuple[tuple[PreparedEdit, ...], Split | None]]:
-    """Latest result of `split_of` for a living set, with its edits; none at first."""
+def _known_states(splats: SplatSet) -> list[tuple[_Step, Split | None]]:
+    """Latest splits of a living set, after each of its steps in their order; none at first."""
     return []
 
 
@@ -200,7 +227,10 @@ def _split_once(
     points = np.concatenate([field.means[rest].astype(np.float64), moved.points[elsewhere]])
     A = np.concatenate([splat_axes(field, rest), moved.jacobian[elsewhere] @ splat_axes(field, others)])
     edit = step.edit
-    if isinstance(edit, Discrete):
+    if step.is_light_alone:
+        assert isinstance(step.patch, SplatPatch)
+        children = shaded_children(edit, step.patch, field, rows, points, A)
+    elif isinstance(edit, Discrete):
         children = cut_children(edit, field, rows, points, A)
         if isinstance(step.patch, SplatPatch):
             whole = np.flatnonzero(~np.isin(rows, children.parent))
@@ -251,9 +281,9 @@ def _parted(
     A = splat_axes(field, n)
     along = np.einsum("cij,cj->ci", A, h)
     across = children.across[:, None]
-    U, s, _ = np.linalg.svd(
-        across[:, None] * A + ((children.r[:, None] - across) * along)[:, :, None] * h[:, None, :]
-    )
+    shape = across[:, None] * A + ((children.r[:, None] - across) * along)[:, :, None] * h[:, None, :]
+    variances, U = np.linalg.eigh(shape @ shape.transpose(0, 2, 1))
+    s = np.sqrt(np.maximum(variances, 0.0))
     U[:, :, 2] *= np.linalg.det(U)[:, None]
     stay = np.ones(len(field), bool)
     stay[parents] = False
