@@ -24,7 +24,7 @@ EDITS = """edits:
 
 
 def sources(folder: Path) -> None:
-    """Files that commands read, on a disk with room: scenes of voxels and of splats, splats, photos and edits.
+    """Inputs of commands, on a disk with room: scenes of voxels and of splats, splats, photos and edits.
 
     And photos without poses, and other programs' checkpoints.
     """

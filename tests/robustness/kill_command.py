@@ -44,7 +44,7 @@ FREE_FORM_EDITS = """edits:
 
 @dataclass(frozen=True)
 class Command:
-    """Command that is killed: `work` runs in a folder that `make` has filled; `check` says what is wrong afterwards.
+    """Command that is killed: `work` runs in a folder that `make` has filled; `check` says faults afterwards.
 
     `work` says numbers of what it has promised; `check` is given the last one. A user then does the same once
     more, after which `check` must pass too, and nothing hidden be left.

@@ -3,8 +3,8 @@
 Or in the middle of the n-th write, with half of its bytes in the file (`write_points`).
 
 A process is forked for each kill, so that what it imports is imported once. Python tells of every such call
-(`sys.addaudithook`) just before it is made; the call after it is the next kill point. A process that a killed one
-had started becomes a child of this one (Linux), which sees how long that goes on.
+(`sys.addaudithook`) just before it is made; the call after it is the next kill point. A process that a
+killed one had started becomes a child of this one (Linux), which sees how long that goes on.
 """
 
 from __future__ import annotations
