@@ -23,7 +23,7 @@ from splat_scenes import splat_scene
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 
 
-SIDES = 340, 300
+SIDES = 500, 300
 """Width and height of the window."""
 HOLD = (120.0, 220.0)
 """Where the view is taken hold of."""
@@ -157,6 +157,7 @@ def test_pages_that_are_closed_leave_nothing_in_the_server(server: EditorServer)
     assert held() <= before
 
 
+@pytest.mark.nightly
 def test_splats_are_drawn_by_the_page(tmp_path: Path) -> None:
     scene = tmp_path / "splats"
     splat_scene().save(scene)
