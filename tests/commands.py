@@ -8,7 +8,7 @@ from cagefield.cli import main
 
 
 def printed(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
-    """What a command that succeeds prints on stdout."""
+    """Standard output of a command that succeeds."""
     capsys.readouterr()
     assert main([str(arg) for arg in argv]) == 0
     return capsys.readouterr().out

@@ -26,8 +26,6 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "editors of the trained digger": (
         "test_editor_panel",
         "test_editor_page",
-        "test_page_renderer",
-        "test_page_drags",
         "test_page_field",
     ),
     "trainings of voxel fields": (
@@ -42,11 +40,14 @@ FAMILIES: dict[str, tuple[str, ...]] = {
 
 LONG: tuple[str, ...] = (
     "test_files",
+    "test_page_renderer",
+    "test_page_layers",
+    "test_editor_gestures",
+    "test_page_drags",
     "test_exporting_page",
     "test_pose_verification",
     "test_poses_stopped",
     "test_poses",
-    "test_capture_variations",
     "test_captures",
     "test_cli_export",
     "test_kills",

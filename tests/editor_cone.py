@@ -26,7 +26,7 @@ edits:
 
 @dataclass
 class Cone:
-    """What is orange-red in a picture: how many pixels, their middle (column, row), their lean in degrees."""
+    """Orange-red pixels of a picture: their number, middle (column, row) and lean in degrees."""
 
     area: int
     at: NDArray[np.float64]

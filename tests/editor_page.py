@@ -70,7 +70,7 @@ class EditorPage:
             waited = time.monotonic() - begun
             assert waited < seconds, f"never came true: {condition}; {self.page.evaluate(_SUMMARY)}"
             # To ask costs milliseconds of a processor that the page and its server need.
-            time.sleep(min(0.02 + 0.1 * waited, 0.1))
+            time.sleep(min(0.05 + 0.1 * waited, 0.25))
 
     def ready(self) -> None:
         """Waits for the server's state and a whole picture."""

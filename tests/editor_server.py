@@ -43,12 +43,12 @@ class EditorAt:
 
     @property
     def token(self) -> str:
-        """What the link has after `?token=`."""
+        """Token of the link, after `?token=`."""
         return urllib.parse.unquote(self.link.partition("?token=")[2])
 
     @property
     def headers(self) -> dict[str, str]:
-        """What a program sends that is let in."""
+        """Request headers of a program that is let in."""
         return {"Authorization": f"Bearer {self.token}"}
 
 
@@ -170,7 +170,7 @@ class PageClient:
 
 
 def trusting_all() -> ssl.SSLContext:
-    """What a program speaks to an editor with, whoever has signed its certificate."""
+    """TLS context that accepts an editor's certificate, whoever has signed it."""
     context = ssl.create_default_context()
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
     return context

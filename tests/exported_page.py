@@ -57,7 +57,7 @@ def until(page: Any, condition: str, seconds: float = 120.0) -> None:
     while not page.evaluate(condition):
         waited = time.monotonic() - begun
         assert waited < seconds, f"never came true: {condition}"
-        time.sleep(min(0.02 + 0.1 * waited, 0.1))
+        time.sleep(min(0.05 + 0.1 * waited, 0.25))
 
 
 def settle(page: Any, level: str = "level?.last") -> None:

@@ -104,7 +104,7 @@ def affine(part: Linear, x: np.ndarray) -> np.ndarray:
 
 
 def hidden_of(trunk: tuple[Linear, ...], encoded: np.ndarray) -> np.ndarray:
-    """What the trunk of `small_mlp` hands to its heads, in float64."""
+    """Activations in float64 that the trunk of `small_mlp` hands to its heads."""
     h = relu(affine(trunk[1], relu(affine(trunk[0], encoded))))
     return relu(affine(trunk[2], np.concatenate([encoded, h], axis=1)))
 

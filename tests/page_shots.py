@@ -1,4 +1,4 @@
-"""What pages of the editor show."""
+"""Pictures on the screen of the editor's pages."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ edits:
   - name: half
     delete: true
     inner: {center: [1.0, 0.0, 0.0], size: [2.0, 4.0, 4.0]}
+    fill: none
+    relight: none
 """
-"""Nothing is left of what lies at x > 0."""
+"""Deletes the half x > 0 of a field; without patches, which `test_page_layers.py` compares."""
 
 
 def shot(page: EditorPage) -> NDArray[np.float64]:

@@ -90,7 +90,7 @@ def text_ply_of(binary: bytes) -> bytes:
 
 
 def splatfacto_tensors(field: SplatField) -> dict[str, np.ndarray]:
-    """What nerfstudio's splatfacto keeps of splats; its rotations are of any length."""
+    """Parameters that nerfstudio's splatfacto keeps of splats; its rotations are of any length."""
     return {
         "means": field.means, "scales": field.log_scales, "quats": 2.0 * field.quaternions,
         "opacities": np.log(field.opacities / (1.0 - field.opacities))[:, None],

@@ -137,7 +137,7 @@ def differences(
 def scene(view: Camera, antialiased: bool, degree: int, seed: int) -> tuple[Values, NDArray, NDArray]:
     """Random parameters, a target [H,W,3] and a background [3]."""
     chance = np.random.default_rng(seed)
-    values = parameters(14, degree, seed)
+    values = parameters(9, degree, seed)
     # One opaque enough for ALPHA_MAX to hold, one beyond the edge whose shape no longer follows, one colour
     # that is clamped at 0, one far smaller than a pixel.
     values["logits"][0] = 6.0

@@ -213,6 +213,7 @@ def test_photos_of_the_data_set_are_the_unedited_truth(bench: Workbench) -> None
         assert np.abs(white - picture).max() <= 1.0  # colour and alpha are rounded to 8 bits
 
 
+@pytest.mark.nightly
 def test_the_exact_map_of_a_whole_scene_is_its_motion(bench: Workbench) -> None:
     """The chair's inner cage holds all its parts: the map shows what scaling them shows, but for light."""
     one = case("chair", "lower_wider")

@@ -62,6 +62,7 @@ def changes(name: str) -> tuple[Changes, ...]:
     return draw_changes(plan.variations, plan.scene, cameras, plan.target, TRAINING, 0)
 
 
+@pytest.mark.nightly
 def test_held_out_photos_are_those_of_the_room_alone(captures):
     for folder in captures.values():
         for view in load_dataset(folder).test:
@@ -72,6 +73,7 @@ def test_held_out_photos_are_those_of_the_room_alone(captures):
         assert len({file.read_bytes() for file in files}) == 1
 
 
+@pytest.mark.nightly
 def test_training_photos_differ_from_the_plain_ones_where_the_distractors_image_is_white(captures):
     plain, changed = captures["room-chair"], captures["room-chair+person+backdrop"]
     different = 0
@@ -124,6 +126,7 @@ def test_added_parts_hide_and_are_hidden_as_in_a_scene_that_has_them():
     np.testing.assert_array_equal(shown, (expected[..., 0] > 0.2 + 1e-5) | (expected[..., 1] > 0.3 + 1e-5))
 
 
+@pytest.mark.nightly
 def test_exposures_are_gains_of_linear_light_clipped(captures):
     plain, exposed = captures["room-chair"], captures["room-chair+exposure+person"]
     chosen = changes("room-chair+exposure+person")
@@ -175,6 +178,7 @@ def test_a_flash_adds_the_light_of_a_lamp_at_the_camera():
     np.testing.assert_allclose(shiny[:, 0], encode_srgb(glint), rtol=1e-5)
 
 
+@pytest.mark.nightly
 def test_a_flash_brightens_half_of_the_training_photos_and_most_what_is_near(captures):
     plain, flashed = captures["room-chair"], captures["room-chair+flash"]
     chosen = [change.flash for change in changes("room-chair+flash")]

@@ -171,6 +171,7 @@ def test_a_scene_with_z_up_stands_upright_in_files(
 # ---- splats of voxels ----
 
 
+@pytest.mark.nightly
 def test_splats_are_fitted_to_voxels_and_their_edits(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

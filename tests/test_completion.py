@@ -300,6 +300,7 @@ def test_a_table_ends_at_its_edge(scenes: tuple[Scene, Scene]) -> None:
     assert scene.render(down[0]).opacity.min() > 0.9 and scene.render(down[1]).opacity.max() < 0.1
 
 
+@pytest.mark.nightly
 def test_strange_cages_are_patched_without_a_traceback(scenes: tuple[Scene, Scene]) -> None:
     scene, _ = scenes
     for odd in (

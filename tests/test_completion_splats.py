@@ -33,6 +33,7 @@ from cagefield.rendering.splats.splitting import split_of
 from cagefield.scene.scene import Scene
 from solid_fields import db
 from splat_rooms import LIGHT, REACH, STEP, STRENGTH, cage, room
+from tiers import nightly_after_first
 
 
 def cameras(scale: float = 1.0) -> tuple[Camera, ...]:
@@ -60,7 +61,7 @@ def test_a_deleted_box_leaves_a_floor_without_a_hole_or_a_shadow():
     assert left < 24.0 and filled > left + 1.5 and relit > left + 9.0
 
 
-@pytest.mark.parametrize("scale", [0.01, 100.0])
+@pytest.mark.parametrize("scale", nightly_after_first([0.01, 100.0]))
 def test_units_make_no_difference(scale):
     field = room(True, scale)
     size = cage().aabb[1] - cage().aabb[0]

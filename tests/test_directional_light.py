@@ -22,7 +22,7 @@ SHARE = 0.65
 AT, TO = (0.3, 0.1), (-0.2, -0.3)
 
 
-def room(at: tuple[float, float] | None, *, sun: float = SHARE, resolution: int = 56) -> VoxelField:
+def room(at: tuple[float, float] | None, *, sun: float = SHARE, resolution: int = 44) -> VoxelField:
     """A floor and a box on it, or none, in the light of the sun; under the box the floor is as dark."""
     axis = np.linspace(-1.0, 1.0, resolution)
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
@@ -52,7 +52,7 @@ def room(at: tuple[float, float] | None, *, sun: float = SHARE, resolution: int 
 
 def cameras() -> tuple[Camera, ...]:
     """Around the floor, from above."""
-    return turntable((0.0, 0.0, -0.3), 3.0, 8, elevation=0.8, width=96, height=96, fov_x=0.6)
+    return turntable((0.0, 0.0, -0.3), 3.0, 8, elevation=0.8, width=72, height=72, fov_x=0.6)
 
 
 def scene(field: VoxelField) -> Scene:

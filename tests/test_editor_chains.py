@@ -16,7 +16,10 @@ from editor_page import EditorPage, editor_page
 from editor_server import EditorServer, editor_server
 from scenes import ball_field
 
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.nightly,
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 EDITS = """\
 version: 1

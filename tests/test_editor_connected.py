@@ -17,7 +17,10 @@ from editor_page import EditorPage, editor_page
 from editor_server import EditorServer, editor_server
 from slabs import slabs
 
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.nightly,
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 EDITS = """\
 version: 1

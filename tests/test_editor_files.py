@@ -19,7 +19,10 @@ from editor_page import EditorPage, editor_page
 from editor_server import editor_server
 from splat_scenes import ball_of_splats
 
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.nightly,
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 EDIT = (
     "version: 1\nedits:\n  - name: ball\n    inner: {center: [0, 0, 0], size: 1.3}\n"

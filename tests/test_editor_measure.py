@@ -13,7 +13,10 @@ from editor_page import editor_page
 from editor_server import editor_server
 from scenes import ball_field
 
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.nightly,
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 RADIUS = 0.5
 

@@ -25,7 +25,10 @@ from editor_page import PATIENCE, EditorPage, editor_page
 from editor_server import EditorServer, editor_server
 from scenes import ball_field
 
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.nightly,
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +111,6 @@ def test_the_gizmo_translates_the_cone(editor: EditorPage) -> None:
     assert shift[1] == pytest.approx(-30, abs=9) and abs(shift[0]) < 8
 
 
-@pytest.mark.nightly
 def test_the_gizmo_rotates_the_cone(editor: EditorPage) -> None:
     before, start = cone(editor.pixels()), editor.edit
     editor.tools(tool="rotate")
@@ -122,7 +124,6 @@ def test_the_gizmo_rotates_the_cone(editor: EditorPage) -> None:
     assert abs(turned) > 5
 
 
-@pytest.mark.nightly
 def test_the_gizmo_scales_the_cone(editor: EditorPage) -> None:
     before, start = cone(editor.pixels()), editor.edit
     editor.tools(tool="scale")
@@ -205,7 +206,6 @@ def test_discrete_and_continuous_copy_and_delete(editor: EditorPage) -> None:
     assert cone(editor.pixels()).area < 0.2 * start.area
 
 
-@pytest.mark.nightly
 def test_ten_steps_are_undone_and_done_again(editor: EditorPage) -> None:
     first, clean, before = editor.state, editor.edits, editor.pixels()
     for n in range(10):
@@ -228,7 +228,6 @@ def test_ten_steps_are_undone_and_done_again(editor: EditorPage) -> None:
     assert cone(after).at[1] < cone(before).at[1] - 15
 
 
-@pytest.mark.nightly
 def test_before_is_shown_while_its_key_is_held(editor: EditorPage) -> None:
     start = cone(editor.pixels()).at
     editor.drag(editor.grip("Z"), (0, -30))

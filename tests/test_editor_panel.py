@@ -25,7 +25,10 @@ from editor_jobs import read_video, render
 from editor_page import PATIENCE, EditorPage, asking, editor_page
 from editor_server import EditorServer, editor_server
 
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.nightly,
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 MOVED_AND_DELETED = (
     EDITS.replace("outer: {margin: 0.35}\n    lattice: 32", "adjustment: discrete")
@@ -68,7 +71,6 @@ def editor(opened: EditorPage, folder: Path) -> EditorPage:
     return opened.loaded(folder / "cone.yaml")
 
 
-@pytest.mark.nightly
 def test_views_show_depth_opacity_and_normals(editor: EditorPage) -> None:
     colour = editor.pixels()
     column, row = np.round(cone(colour).at).astype(int)
@@ -153,7 +155,6 @@ def test_what_a_delete_uncovers_is_filled_unless_it_is_switched_off(
         tab.page.close()
 
 
-@pytest.mark.nightly
 def test_the_split_shows_before_on_its_left_and_after_on_its_right(editor: EditorPage) -> None:
     start = cone(editor.pixels()).at
     editor.drag(editor.grip("Z"), (0, -30))
@@ -220,7 +221,6 @@ def test_edits_are_hidden_locked_renamed_and_duplicated(editor: EditorPage) -> N
     assert len(editor.edits) == 1 and cone(editor.pixels()).at == pytest.approx(edited, abs=1.0)
 
 
-@pytest.mark.nightly
 def test_the_order_of_edits_and_the_history_list(editor: EditorPage, folder: Path) -> None:
     plain = cone(editor.pixels())
     file = folder / "two.yaml"
@@ -239,7 +239,6 @@ def test_the_order_of_edits_and_the_history_list(editor: EditorPage, folder: Pat
     assert cone(editor.pixels()).at == pytest.approx(up.at, abs=1.0)
 
 
-@pytest.mark.nightly
 def test_a_mirrored_copy(editor: EditorPage) -> None:
     editor.fill("Position", -0.115, "z")
     plain, (one,) = editor.pixels(cages=True), editor.edits
@@ -362,7 +361,6 @@ def test_the_inner_cage_is_fitted_and_the_outer_one_is_a_margin_of_it(
     assert difference(editor.pixels(), plain) < 0.05
 
 
-@pytest.mark.nightly
 def test_snapping_axes_and_several_corners(editor: EditorPage) -> None:
     page, start = editor.page, editor.edit
     editor.tools(tool="rotate")
@@ -427,7 +425,6 @@ def sees(pixels: Any, count: int) -> None:
         assert time.monotonic() < end, f"{pixels().sum()} pixels, not {count}"
 
 
-@pytest.mark.nightly
 def test_two_pages_show_the_same_and_each_its_own_screenshot(
     editor: EditorPage, server: EditorServer
 ) -> None:
@@ -547,7 +544,6 @@ def test_a_camera_path_is_recorded_played_and_rendered(editor: EditorPage, folde
         time.sleep(0.05)
 
 
-@pytest.mark.nightly
 def test_playing_a_path_shows_the_edits_on_their_way_and_then_as_they_are(editor: EditorPage) -> None:
     page = editor.page
     plain = editor.pixels()
@@ -601,7 +597,6 @@ def test_playing_a_path_shows_the_edits_on_their_way_and_then_as_they_are(editor
     assert editor.state["keys"][0]["parts"] == {}
 
 
-@pytest.mark.nightly
 def test_save_as_goes_on_with_the_new_folder(editor: EditorPage, folder: Path) -> None:
     page = editor.page
     editor.drag(editor.grip("Z"), (0, -20))

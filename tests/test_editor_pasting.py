@@ -72,6 +72,7 @@ def chosen(page: EditorPage, source: str, offered: list[str]) -> None:
     page.changed(lambda: page.page.click("dialog .primary"))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("render", ["server", "page"])
 def test_a_paste_is_shown_moved_cropped_and_undone(server: EditorServer, render: str) -> None:
     with editor_page(asking(server.link, render), 960, 480) as page:

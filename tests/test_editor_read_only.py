@@ -12,7 +12,10 @@ from editor_page import EditorPage, editor_page
 from editor_server import EditorServer, editor_server, page
 from scenes import ball_scene
 
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.nightly,
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 BALL = {"inner": {"center": [0, 0, 0], "size": 1.1}, "outer": {"margin": 0.4}, "lattice": 16, "name": "ball"}
 EDITING_KEYS = [
@@ -68,7 +71,6 @@ def tried(shown: EditorPage) -> None:
     )
 
 
-@pytest.mark.nightly
 def test_who_may_look_finds_nothing_that_edits(links: tuple[EditorServer, str]) -> None:
     server, link = links
     with editor_page(link, 1100, 760) as shown:

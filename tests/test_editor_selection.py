@@ -21,7 +21,10 @@ from editor_server import EditorServer, editor_server
 from page_shots import shot
 from splat_scenes import BALL_RADIUS, ball_and_floor
 
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.nightly,
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 BALL, FLOOR = 800, 576
 
@@ -116,7 +119,6 @@ def test_a_stroke_of_the_brush_selects_the_visible_surface(editor: EditorPage) -
     assert selected(editor, lambda: editor.press("Control+Shift+z")) == count
 
 
-@pytest.mark.nightly
 def test_lasso_through_and_keys(editor: EditorPage) -> None:
     middle, radius = ball_at(editor)
     editor.press("j")
@@ -149,7 +151,6 @@ def test_rectangle_by_shift_grows_and_shrinks(editor: EditorPage) -> None:
     assert selected(editor, lambda: editor.press("Control+-")) < grown
 
 
-@pytest.mark.nightly
 def test_modifier_keys_subtract(editor: EditorPage) -> None:
     middle, radius = ball_at(editor)
     editor.press("j")
@@ -164,7 +165,6 @@ def test_modifier_keys_subtract(editor: EditorPage) -> None:
     assert editor.page.evaluate("document.querySelectorAll('.toast').length") == 0
 
 
-@pytest.mark.nightly
 def test_a_flood_becomes_a_cage_in_one_key(editor: EditorPage) -> None:
     middle, _ = ball_at(editor)
     editor.page.click(".tools .select-flood")
@@ -192,7 +192,6 @@ def _tinted(picture: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray((red > 0.85) & (green > 0.28) & (green < 0.75) & (blue < 0.2))
 
 
-@pytest.mark.nightly
 def test_another_page_shows_the_selection_and_undoes_it(editor: EditorPage, server: EditorServer) -> None:
     middle, radius = ball_at(editor)
     editor.press("m")
@@ -243,7 +242,6 @@ def test_the_help_lists_the_keys(editor: EditorPage) -> None:
     editor.press("?")
 
 
-@pytest.mark.nightly
 def test_isolated_splats_alone_are_seen(editor: EditorPage) -> None:
     middle, _ = ball_at(editor)
     floor = shot(editor)[-75:-60, 60:-60]

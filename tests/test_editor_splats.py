@@ -25,7 +25,10 @@ from editor_server import EditorServer, editor_server
 from splat_scenes import BALL_RADIUS as RADIUS
 from splat_scenes import ball_and_floor
 
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.nightly,
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +99,6 @@ def test_the_ball_is_dragged_and_the_floor_stays(editor: EditorPage) -> None:
     assert editor.edit["lattice_error"] in (None, [0.0, 0.0])
 
 
-@pytest.mark.nightly
 def test_moved_copied_deleted_and_undone(editor: EditorPage) -> None:
     start = cone(editor.pixels())
     editor.changed(lambda: editor.press("d"))
@@ -131,7 +133,6 @@ def test_the_inner_cage_is_fitted_to_the_ball(editor: EditorPage) -> None:
     np.testing.assert_allclose(inner.max(axis=0), RADIUS, atol=0.05)
 
 
-@pytest.mark.nightly
 def test_another_camera_sees_the_ball_over_the_same_place(editor: EditorPage) -> None:
     before, start = editor.page.evaluate("cagefield.camera.c2w"), cone(editor.pixels())
     with editor.held((60, 400), (60, 0)):
@@ -146,7 +147,6 @@ def test_another_camera_sees_the_ball_over_the_same_place(editor: EditorPage) ->
     assert cone(editor.pixels()).at == pytest.approx(start.at, abs=1.0)
 
 
-@pytest.mark.nightly
 def test_edits_are_saved_found_again_and_rendered_to_a_video(editor: EditorPage, scene: Path) -> None:
     editor.drag(editor.grip("X"), (35, 0))
     before, edits = editor.pixels(), editor.edits
@@ -185,7 +185,6 @@ def test_the_ball_follows_while_it_is_dragged(editor: EditorPage) -> None:
     editor.settle()
 
 
-@pytest.mark.nightly
 def test_a_snapped_drag_moves_by_round_lengths(editor: EditorPage) -> None:
     start = editor.edit
     mouse, keyboard, at = editor.page.mouse, editor.page.keyboard, editor.grip("X")
@@ -206,7 +205,6 @@ def test_a_snapped_drag_moves_by_round_lengths(editor: EditorPage) -> None:
     assert by > 0.05 and len(digits.split(".")[-1]) <= 2, digits
 
 
-@pytest.mark.nightly
 def test_before_and_after_stand_side_by_side(editor: EditorPage) -> None:
     clean = editor.pixels()
     editor.drag(editor.grip("X"), (40, 0))

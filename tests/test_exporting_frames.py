@@ -29,6 +29,7 @@ from commands import given_up, printed, refused
 from full_disks import fill, small_disk
 from scenes import files_of
 from splat_scenes import ball_of_splats, random_splats, splat_scene
+from tiers import nightly_after_first
 
 Usd: Any = pytest.importorskip("pxr.Usd", reason="USD is read by usd-core (extra usd)")
 
@@ -75,7 +76,7 @@ def assert_close(got: SplatField, expected: SplatField) -> None:
     np.testing.assert_allclose(got.sh, expected.sh, atol=1e-5)
 
 
-@pytest.mark.parametrize("suffix", [".usda", ".usdc", ".usdz"])
+@pytest.mark.parametrize("suffix", nightly_after_first([".usdc", ".usda", ".usdz"]))
 def test_time_samples_are_the_splats_of_each_frame(tmp_path: Path, suffix: str) -> None:
     scene, file = scene_with(MOVED), tmp_path / f"x{suffix}"
     info = write_scenes_usd(file, [StageScene("ball", scene, scene.up)], PATH)
@@ -156,6 +157,7 @@ def test_a_sequence_has_the_splats_of_each_frame(
     assert files[1].read_bytes() != b"mine"
 
 
+@pytest.mark.nightly
 def test_a_sequence_takes_the_memory_of_one_frame(tmp_path: Path) -> None:
     """Five times the frames, no more memory; the frames together would take seven times the slack."""
     field = ball_of_splats(20_000)

@@ -41,7 +41,7 @@ FREE_FORM: tuple[Continuous, ...] = (
 
 
 def scene_of(kind: str) -> Scene:
-    edits = [edit.replace(relight="none") for edit in FREE_FORM]
+    edits = [edit.replace(relight="none", lattice=32) for edit in FREE_FORM]
     if kind == "splats":
         return splats_scene(*edits)
     return dataclasses.replace(lumps_scene(), edits=EditStack(edits))

@@ -123,6 +123,7 @@ class _Solver:
         return RefinedPoses(cameras, None, 0.5, True)
 
 
+@pytest.mark.nightly
 def test_training_finds_folded_poses_anew_and_holds_out_the_same_photos(
     photos, tmp_path, monkeypatch, capsys
 ):

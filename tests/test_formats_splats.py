@@ -448,7 +448,7 @@ def test_ksplat_holds_harmonics_red_first(tmp_path: Path) -> None:
 MUTATIONS = 60
 """A format; `benchmarks/splat_files.py damage` makes a thousand."""
 
-USD_MUTATIONS = 8
+USD_MUTATIONS = 3
 """A suffix of USD, of which each file is read by a process of its own."""
 
 

@@ -80,6 +80,7 @@ def test_they_are_measured_where_they_are_named() -> None:
         chosen(("digger",), ("twist_stem",))
 
 
+@pytest.mark.nightly
 def test_table_has_columns_of_the_inside_only_with_closed_forms() -> None:
     from benchmarks.common.figures import Figures
 

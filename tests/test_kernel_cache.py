@@ -88,6 +88,7 @@ def test_a_second_process_loads_its_kernels_from_the_disk(tmp_path: Path) -> Non
     assert again == point
 
 
+@pytest.mark.nightly
 def test_a_folder_that_cannot_be_made_is_done_without(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     (tmp_path / "double.py").write_text(DOUBLE)

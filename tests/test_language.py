@@ -5,6 +5,7 @@ A failing test names the modules with the most cases. Lower a limit in LIMITS wi
 
 from __future__ import annotations
 
+import ast
 from collections import Counter
 from pathlib import Path
 
@@ -50,6 +51,15 @@ def test_sentences_with_what(tree: SourceTree) -> None:
 def test_sentences_that_begin_with_a_pronoun(tree: SourceTree) -> None:
     found = pronoun_starts(tree)
     check("sentences that begin with what, that, those, the same", found.total(), found)
+
+
+def test_docstrings_of_test_helpers_begin_with_nouns() -> None:
+    """Modules of `tests` that are no test modules; names of tests, and their docstrings, are sentences."""
+    files = [file for file in (ROOT / "tests").rglob("*.py") if not file.name.startswith("test_")]
+    modules = {file.stem: ast.parse(file.read_text(encoding="utf-8")) for file in files}
+    assert len(modules) > 80
+    found = pronoun_starts(SourceTree(modules, "tests"))
+    assert found.total() == 0, found
 
 
 def test_functions_called_of(tree: SourceTree) -> None:

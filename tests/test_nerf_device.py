@@ -71,6 +71,7 @@ def test_a_training_step_goes_forward_and_back_without_the_host(
     assert not calls
 
 
+@pytest.mark.nightly
 def test_networks_in_half_precision_learn_as_those_in_full(tmp_path) -> None:
     photos = load_dataset(make_scene("microphone", tmp_path / "m", views=8, size=24, test_views=2))
     runs = {}

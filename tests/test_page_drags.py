@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from editor_cone import EDITS, cone
+from cagefield.cameras.camera import Camera
+from cagefield.scene.scene import Scene
+from editor_cone import cone
 from editor_page import PATIENCE, EditorPage, asking, editor_page
 from editor_server import EditorServer, editor_server
 from page_shots import HALF, alike
+from scenes import ball_cameras, ball_field
 
 MANY = "version: 1\nedits:\n" + "".join(
     f"  - {{delete: true, inner: {{center: [{3 + n}.0, 0.0, 0.0], size: [0.5, 0.5, 0.5]}}}}\n"
     for n in range(24)
 )
-"""More edits than a page's shader holds, all beside the digger."""
+"""More edits than a page's shader holds, all beside the ball."""
+BALL = """\
+version: 1
+edits:
+  - name: ball
+    inner: {center: [0, 0, 0], size: 0.8}
+    outer: {margin: 0.3}
+    lattice: 32
+    relight: none
+"""
 
 ALIKE = 33.0
 """dB between the page's whole picture and the server's, which is a JPEG of quality 95: about 40 by itself."""
@@ -27,12 +38,15 @@ pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptio
 
 
 @pytest.fixture(scope="module")
-def scene(trained_digger: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A red ball, and edit files beside it."""
     folder = tmp_path_factory.mktemp("drags")
-    shutil.copytree(trained_digger, folder / "digger")
-    for name, text in (("half", HALF), ("cone", EDITS), ("many", MANY)):
+    camera = Camera.look_at((0.0, -1.9, 0.6), (0, 0, 0), width=320, height=230, fov_x=0.8)
+    field = ball_field(resolution=33, radius=0.3)
+    Scene(field, cameras={"train": ball_cameras(3), "test": (camera,)}).save(folder / "ball")
+    for name, text in (("half", HALF), ("ball", BALL), ("many", MANY)):
         (folder / f"{name}.yaml").write_text(text)
-    return folder / "digger"
+    return folder / "ball"
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +58,7 @@ def server(scene: Path) -> Iterator[EditorServer]:
 @pytest.fixture(scope="module")
 def pair(server: EditorServer) -> Iterator[tuple[EditorPage, EditorPage]]:
     """Two pages of one editor: one draws all of its pictures itself, the server draws those of the other."""
-    with editor_page("about:blank", 500, 240) as first:
+    with editor_page("about:blank", 360, 220) as first:
         first.page.add_init_script(
             "window.sockets = []; const Plain = WebSocket;"
             "window.WebSocket = class extends Plain {"
@@ -68,7 +82,7 @@ def test_a_drag_is_drawn_by_the_page_and_ends_as_the_server_draws_it(
 ) -> None:
     own, other = pair
     own.page.bring_to_front()
-    own.loaded(scene.parent / "cone.yaml")
+    own.loaded(scene.parent / "ball.yaml")
     assert own.page.evaluate("cagefield.picture.picture") == 0, "the page's own picture at rest"
     assert alike(pair) > ALIKE
     before = cone(other.pixels())
@@ -89,7 +103,7 @@ def test_a_drag_is_drawn_by_the_page_and_ends_as_the_server_draws_it(
         own.page.bring_to_front()
     own.until("cagefield.drag === null")
     assert alike(pair) > ALIKE
-    assert before.at[1] - cone(own.pixels()).at[1] > 5.0, "the cone went up"
+    assert before.at[1] - cone(own.pixels()).at[1] > 5.0, "the ball went up"
     own.page.bring_to_front()
     own.changed(lambda: own.press("Control+z"))
     assert alike(pair) > ALIKE

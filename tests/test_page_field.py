@@ -20,13 +20,23 @@ from page_fields import lumps
 from scenes import ball_field
 
 
+def test_pictures_come_back() -> None:
+    check_pictures(lumps(2, False))
+
+
+@pytest.mark.nightly
 def test_pictures_of_a_trained_field_come_back(trained_digger: Path) -> None:
-    scene = Scene.open(trained_digger)
-    assert isinstance(scene.field, VoxelField)
-    back = decode_page_field(encode_page_field(scene.field, step=0.7, background=(0.2, 0.4, 0.6)))
+    field = Scene.open(trained_digger).field
+    assert isinstance(field, VoxelField)
+    check_pictures(field)
+
+
+def check_pictures(field: VoxelField) -> None:
+    """Pictures before and after encoding are 45 dB alike."""
+    back = decode_page_field(encode_page_field(field, step=0.7, background=(0.2, 0.4, 0.6)))
     assert (back.step, back.background) == (0.7, (0.2, 0.4, 0.6))
-    ours, theirs = VoxelRenderer(scene.field), VoxelRenderer(back.field)
-    for camera in turntable(scene.field.center, 3.0, 3, elevation=0.4, width=96, height=96, fov_x=0.8):
+    ours, theirs = VoxelRenderer(field), VoxelRenderer(back.field)
+    for camera in turntable(field.center, 3.0, 3, elevation=0.4, width=96, height=96, fov_x=0.8):
         first, second = ours.render(camera), theirs.render(camera)
         assert first is not None and second is not None
         assert psnr(first.rgb, second.rgb) >= 45.0

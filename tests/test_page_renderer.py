@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,22 +11,30 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from cagefield.edits import EditStack
 from editor_page import USUAL, EditorPage, Point, asking, editor_page
 from editor_server import EditorServer, editor_server
 from editor_server import page as socket_page
 from hand import Hand
+from page_fields import lumps_scene
 from page_shots import HALF, db, filled, shot
 from splat_scenes import splat_scene
 
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 
 
+SIDES = 500, 300
+"""Width and height of the window."""
+HOLD = (120.0, 220.0)
+"""Where the view is taken hold of."""
+
+
 @pytest.fixture(scope="module")
-def scene(trained_digger: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("page")
-    shutil.copytree(trained_digger, folder / "digger")
+    dataclasses.replace(lumps_scene(), edits=EditStack(), background=(1.0, 1.0, 1.0)).save(folder / "lumps")
     (folder / "half.yaml").write_text(HALF)
-    return folder / "digger"
+    return folder / "lumps"
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +50,7 @@ DRAWN_BY = "document.querySelector('.status .figures').textContent.includes('{}'
 def turned(page: EditorPage, by: tuple[float, float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(what the page draws with the button held, what the server draws then at rest) of a turned view."""
     drawn, seq = page.page.evaluate("[cagefield.page.drawn, cagefield.camera.seq]")
-    with page.held((120.0, 330.0), by, steps=8):
+    with page.held(HOLD, by, steps=8):
         page.until(f"cagefield.page.drawn > {drawn + 3}")
         assert page.page.evaluate("cagefield.camera.seq") == seq, "the server need not know yet"
         page.until(DRAWN_BY.format("drawn here"))
@@ -55,7 +62,7 @@ def turned(page: EditorPage, by: tuple[float, float]) -> tuple[NDArray[np.float6
 
 
 def test_the_page_draws_the_view_that_is_turned(server: EditorServer, scene: Path) -> None:
-    with editor_page(asking(server.link, "page"), 500, 420) as page:
+    with editor_page(asking(server.link, "page"), *SIDES) as page:
         page.ready()
         page.press("n", "o")  # room for the picture, and no cages on it
         page.until("cagefield.page.why === null && cagefield.page.draws")
@@ -71,9 +78,8 @@ def test_the_page_draws_the_view_that_is_turned(server: EditorServer, scene: Pat
         full = filled(whole)
         own, whole = turned(page, (-70.0, 5.0))
         assert db(own, whole) > 22.0
-        # With its edits: half of the digger is gone, and the picture is not the one before them.
+        # With its edits: half of the field is gone, and the picture is not the one before them.
         assert filled(whole) < 0.75 * full and filled(own) < 0.85 * full
-        page.press("u")
         # A context that is lost and restored draws again.
         page.page.evaluate(
             "window.lost = document.querySelector('canvas').getContext('webgl2')"
@@ -85,19 +91,21 @@ def test_the_page_draws_the_view_that_is_turned(server: EditorServer, scene: Pat
         turned(page, (30.0, 0.0))
 
 
+@pytest.mark.nightly
 def test_software_and_addresses_leave_it_to_the_server(server: EditorServer) -> None:
     for render, why in (("best", "no GPU"), ("server", "address")):
-        with editor_page(asking(server.link, render), 500, 420) as page:
+        with editor_page(asking(server.link, render), *SIDES) as page:
             page.ready()
             assert why in page.page.evaluate("cagefield.page.why")
-            with page.held((120.0, 330.0), (60.0, 5.0)):
+            with page.held(HOLD, (60.0, 5.0)):
                 pass
             page.settle()
             assert page.page.evaluate("cagefield.page.drawn") == 0
 
 
+@pytest.mark.nightly
 def test_fingers_turn_shift_and_pinch(server: EditorServer) -> None:
-    with editor_page(asking(server.link, "page"), 500, 420, touch=True) as page:
+    with editor_page(asking(server.link, "page"), *SIDES, touch=True) as page:
         page.ready()
         page.press("n", "o")
         page.until("cagefield.page.draws")
@@ -113,13 +121,13 @@ def test_fingers_turn_shift_and_pinch(server: EditorServer) -> None:
             c2w = np.array(page.page.evaluate("cagefield.camera.c2w")).reshape(4, 4)
             return c2w[:3, 3], -c2w[:3, 2]
 
-        eye, ahead = moved([(200, 330)], [(203, 330)])
-        turned, other = moved([(200, 330)], [(280, 330)])
+        eye, ahead = moved([(200, 230)], [(203, 230)])
+        turned, other = moved([(200, 230)], [(280, 230)])
         assert np.dot(ahead, other) < 0.95 and not np.allclose(eye, turned)
-        shifted, same = moved([(150, 330), (250, 330)], [(150, 280), (250, 280)])
+        shifted, same = moved([(150, 230), (250, 230)], [(150, 180), (250, 180)])
         np.testing.assert_allclose(same, other, atol=1e-3)
         assert abs(np.dot(shifted - turned, other)) < 0.1 * np.linalg.norm(shifted - turned)
-        near, same = moved([(150, 330), (250, 330)], [(100, 330), (300, 330)])
+        near, same = moved([(150, 230), (250, 230)], [(100, 230), (300, 230)])
         np.testing.assert_allclose(same, other, atol=1e-3)
         assert np.dot(near - shifted, other) > 0.9 * np.linalg.norm(near - shifted) > 0.1
 
@@ -149,11 +157,12 @@ def test_pages_that_are_closed_leave_nothing_in_the_server(server: EditorServer)
     assert held() <= before
 
 
+@pytest.mark.nightly
 def test_splats_are_drawn_by_the_page(tmp_path: Path) -> None:
     scene = tmp_path / "splats"
     splat_scene().save(scene)
     (tmp_path / "half.yaml").write_text(HALF)
-    with editor_server(scene) as server, editor_page(asking(server.link, "page"), 500, 420) as page:
+    with editor_server(scene) as server, editor_page(asking(server.link, "page"), *SIDES) as page:
         page.ready()
         page.press("n", "o")
         page.until("cagefield.page.why === null && cagefield.page.draws")
@@ -178,7 +187,7 @@ def test_discs_are_drawn_by_the_server(tmp_path: Path) -> None:
     usual = (*USUAL, "status of 409")
     with (
         editor_server(scene) as server,
-        editor_page(asking(server.link, "page"), 500, 420, usual=usual) as page,
+        editor_page(asking(server.link, "page"), *SIDES, usual=usual) as page,
     ):
         page.ready()
         page.until("cagefield.page.why.includes('discs')")

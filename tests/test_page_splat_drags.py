@@ -39,7 +39,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def pair(files: Path) -> Iterator[tuple[EditorPage, EditorPage]]:
     """Two pages of one editor: one draws all of its pictures itself, the server draws those of the other."""
-    with editor_server(files / "ball") as server, editor_page(asking(server.link, "all"), 500, 240) as first:
+    with editor_server(files / "ball") as server, editor_page(asking(server.link, "all"), 360, 220) as first:
         first.ready()
         second = first.tab(asking(server.link, "server"))
         second.ready()

@@ -153,7 +153,8 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
 }
 
 
-@pytest.mark.parametrize("name", nightly_after_first(DAMAGES))
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", DAMAGES)
 def test_a_database_that_is_damaged_after_a_stop_is_made_anew(
     stopped: Path, tmp_path: Path, name: str
 ) -> None:

@@ -15,6 +15,7 @@ from scenes import ball_scene
 PATIENCE = 120.0
 
 
+@pytest.mark.nightly
 def test_it_ends_by_itself_and_keeps_the_kernels_that_it_compiled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -56,6 +56,21 @@ def test_a_second_process_loads_its_kernels_from_the_disk(tmp_path: Path) -> Non
     assert len(warned) == 1 and "compiled kernels cannot be kept in" in warned[0]
 
 
+def test_a_new_installation_of_the_same_source_loads_its_kernels(tmp_path: Path) -> None:
+    """It writes the files of the source anew, with other times."""
+    module = tmp_path / "installed.py"
+    module.write_text(
+        "from cagefield.compute.numba_cache import njit\n\n"
+        "@njit(cache=True)\ndef twice(x):\n    return 2.0 * x\n\n"
+        "print(twice(1.5), sum(twice.stats.cache_hits.values()))\n"
+    )
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    for hits in (0, 1):
+        os.utime(module, (hits, 1e9 + hits))
+        done = subprocess.run([sys.executable, str(module)], env=environment, capture_output=True, text=True)
+        assert done.stdout.split() == ["3.0", str(hits)], done.stderr
+
+
 def test_a_folder_that_cannot_be_made_is_done_without(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     printed, warned = ask(tmp_path / "file")

@@ -21,6 +21,7 @@ from cagefield.fields.contraction import contract
 from cagefield.procedural import make_scene
 from commands import printed, refused
 from posed_photos import room_capture
+from tiers import nightly_after_first
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
@@ -160,7 +161,7 @@ def test_ndc_are_refused_where_they_do_not_suit(forward, around, tmp_path) -> No
         )
 
 
-@pytest.mark.parametrize(("kind", "gain"), [("forward", 2.0), ("around", 0.5)])
+@pytest.mark.parametrize(("kind", "gain"), nightly_after_first([("forward", 2.0), ("around", 0.5)]))
 def test_it_learns(kind, gain, request) -> None:
     dataset = load_dataset(request.getfixturevalue(kind))
     result = train_nerf(dataset, tiny(steps=150))

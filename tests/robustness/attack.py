@@ -35,7 +35,7 @@ Work = tuple[str, int, int]
 
 @dataclass
 class Outcome:
-    """What came of the inputs of a reader."""
+    """Counts and faults over the inputs of a reader."""
 
     tried: int = 0
     refused: int = 0
@@ -157,7 +157,7 @@ def _batch(
 
 
 def _after(work: list[Work], name: str, number: int) -> list[Work]:
-    """What is left of the work after an input of a reader."""
+    """Rest of the work after an input of a reader."""
     at = next(k for k, (each, first, last) in enumerate(work) if each == name and first <= number < last)
     last = work[at][2]
     rest = [(name, number + 1, last)] if number + 1 < last else []

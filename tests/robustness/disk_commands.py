@@ -24,7 +24,7 @@ EDITS = """edits:
 
 
 def sources(folder: Path) -> None:
-    """What commands read, on a disk with room: scenes of voxels and of splats, splats, photos and edits.
+    """Inputs of commands, on a disk with room: scenes of voxels and of splats, splats, photos and edits.
 
     And photos without poses, and other programs' checkpoints.
     """
@@ -130,4 +130,4 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
     "bench training": DiskCommand(_TRAINING, "curve.csv"),
     "bench training, its scene": DiskCommand(f"{_TRAINING} --scene-out {{work}}", "curve.csv", work="new"),
 }
-"""What writes files, by what it writes."""
+"""Commands that write files, by their results."""

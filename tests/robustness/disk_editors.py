@@ -37,11 +37,11 @@ Said = tuple[bool, str]
 
 @dataclass(frozen=True)
 class EditorAction:
-    """What a page asks for, by its socket or by requests, and how it went."""
+    """Request of a page, by its socket or by HTTP, and its outcome."""
 
     ask: Callable[[EditorServer, PageClient, int], Said]
     place: str
-    """What the words must name."""
+    """Path or word that the message must name."""
     scene: str = "voxels"
     """Of `disk_commands.sources`."""
     comes_again: bool = False
@@ -141,7 +141,7 @@ EDITORS: dict[str, EditorAction] = {
     "view, an export": EditorAction(_export, "tmp", scene="splats"),
     "view, a file from a page": EditorAction(_open, "", scene="splats", comes_again=True),
 }
-"""What an editor writes, by its words in the table."""
+"""Files that an editor writes, by their words in the table."""
 
 
 @contextlib.contextmanager
@@ -183,7 +183,7 @@ def _prepare(client: PageClient, hello: dict[str, Any], edits: int) -> None:
 def _need(
     action: EditorAction, server: EditorServer, client: PageClient, place: Path, short: Shortage
 ) -> int:
-    """What the result takes: it is made once with room."""
+    """Bytes and names of the result, which is made once with room."""
     before = contents(place)
     short.begin(place)
     done, words = action.ask(server, client, 0)

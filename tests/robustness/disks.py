@@ -21,7 +21,7 @@ BYTES = SHORTAGES["bytes"]
 
 @dataclass
 class Filled:
-    """What came of some runs on full disks."""
+    """Counts of runs on full disks."""
 
     runs: int = 0
     fitted: int = 0
@@ -81,7 +81,7 @@ def ran(arguments: list[str]) -> tuple[int, list[str]]:
 
 
 def room_for(command: DiskCommand, source: Path, short: Shortage = BYTES) -> int:
-    """What a command's result takes of what disks are short of."""
+    """Bytes and names that a command's result takes."""
     with tempfile.TemporaryDirectory() as folder, disk(Path(folder) / "disk") as place:
         arguments = _prepared(command, source, place, again=False)
         short.begin(place)
@@ -151,7 +151,7 @@ def fill(
 
 
 def _line_problem(lines: list[str], places: list[Path]) -> str | None:
-    """What is wrong with what was said: one line at the end, that names one of the places."""
+    """Fault of the output, which must end with one line that names one of the places."""
     said = [line for line in lines if line.startswith("cagefield: ") and "cagefield: warning" not in line]
     if len(said) != 1 or lines[-1] != said[0] or any("Traceback" in line for line in lines):
         return f"said {lines[-3:]}"

@@ -1,4 +1,7 @@
-"""What an editor reads beside its scene: tokens, locks, certificates. Honest seeds, and how they are read."""
+"""Files that an editor reads beside its scene: tokens, locks, certificates.
+
+Honest seeds, and how they are read.
+"""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ class Answers:
 def during(
     server: EditorServer, flood: str | None, questions: int, every: float = 0.2, floods: int = 1
 ) -> Answers:
-    """What a second page sees of a flood, or of none: answers to so many questions."""
+    """Answers that a second page gets to so many questions, during a flood or none."""
     found = Answers()
     with page(server) as (client, hello):
         if flood == "screenshots":  # of as many pixels as there may be

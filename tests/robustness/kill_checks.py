@@ -1,4 +1,4 @@
-"""What is wrong with files after a kill: not readable, not all there, or not what was promised.
+"""Faults of files after a kill: not readable, not all there, or not what was promised.
 
 Each check takes the folder of the work, and the last number that it said before it was killed, -1 for none.
 """
@@ -15,7 +15,7 @@ Check = Callable[[Path, int], "str | None"]
 
 
 def scene_problem(folder: Path, said: int, name: str = "scene") -> str | None:
-    """What is wrong with the scene: not readable, the user's file gone, or not what was promised."""
+    """Fault of the scene: not readable, the user's file gone, or another one than promised."""
     try:
         scene = Scene.open(folder / name)
     except Exception as error:
@@ -32,7 +32,7 @@ def scene_problem(folder: Path, said: int, name: str = "scene") -> str | None:
 
 
 def new_problem(folder: Path, said: int) -> str | None:
-    """The same of a scene that may not be there yet."""
+    """Fault of a scene that may not be there yet."""
     if said < 1 and not (folder / "new").exists():
         return scene_problem(folder, 0)
     return scene_problem(folder, said, "new") or scene_problem(folder, 0)
@@ -100,7 +100,7 @@ def video_problem(folder: Path, said: int) -> str | None:
 
 
 def old_problem(name: str, check: Check) -> Check:
-    """The same of what has replaced an older file, or folder: it must be there, whatever was said."""
+    """Fault of a file or folder that has replaced an older one: it must be there, whatever was said."""
 
     def problem(folder: Path, said: int) -> str | None:
         return check(folder, 1) if (folder / name).exists() else f"lost: {name}"
@@ -192,7 +192,7 @@ def photos_problem(name: str) -> Check:
 
 
 def demo_problem(folder: Path, said: int) -> str | None:
-    """What is wrong with the results of `demo`: scenes, photos, pictures, the video of 2 frames."""
+    """Fault of the results of `demo`: scenes, photos, pictures, the video of 2 frames."""
     import imageio.v3 as imageio
 
     from cagefield.edits import load_edits
@@ -230,7 +230,7 @@ def posed_problem(folder: Path, said: int) -> str | None:
 
 
 def poses_problem(folder: Path, said: int) -> str | None:
-    """What is wrong with the data set, of which an old one was there: not whole, or the user's file gone."""
+    """Fault of the data set, of which an old one was there: not whole, or the user's file gone."""
     from cagefield import datasets
     from cagefield.datasets.colmap.colmap_files import check_complete
     from cagefield.images.image_files import read_image

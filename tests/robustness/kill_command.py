@@ -1,4 +1,4 @@
-"""What a command that is killed consists of, and what several of them have."""
+"""Parts of a command that is killed, and parts that several of them share."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ FREE_FORM_EDITS = """edits:
 
 @dataclass(frozen=True)
 class Command:
-    """What is killed: `work` runs in a folder that `make` has filled; `check` says what is wrong afterwards.
+    """Command that is killed: `work` runs in a folder that `make` has filled; `check` says faults afterwards.
 
     `work` says numbers of what it has promised; `check` is given the last one. A user then does the same once
     more, after which `check` must pass too, and nothing hidden be left.
@@ -95,9 +95,9 @@ def put_splats(folder: Path) -> None:
 
 
 def renamed(command: Command, target: str | None = None) -> Command:
-    """The same where names cannot be exchanged.
+    """The command where names cannot be exchanged.
 
-    What was at `target` may then be aside until the next run, which brings it back.
+    The content of `target` may then be aside until the next run, which brings it back.
     """
 
     def work(folder: Path, say: Say) -> None:

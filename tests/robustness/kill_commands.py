@@ -320,7 +320,7 @@ COMMANDS: dict[str, Command] = {
     "edit --overwrite, renames": renamed(Command(put_scene, _edit, scene_problem)),
     **LINES,
 }
-"""What writes without kernels: a process for each kill takes a tenth of a second."""
+"""Commands that write without kernels: a process for each kill takes a tenth of a second."""
 
 SLOW_COMMANDS: dict[str, Command] = {
     "edit, free-form": Command(put_free_form, _edit, _free_form_problem),

@@ -53,7 +53,7 @@ def _with_old_file(ending: str) -> Make:
 
 
 def _with_old_bytes(name: str, make: Make = put_scene) -> Make:
-    """What `make` makes, and what another run of the command wrote, copied."""
+    """Copies of the files of `make` and of another run of the command."""
 
     def made(folder: Path) -> None:
         make(folder)
@@ -169,7 +169,7 @@ def _files(words: str, endings: tuple[str, ...]) -> dict[str, Command]:
 
 
 def _appended_problem(folder: Path, said: int) -> str | None:
-    """What is wrong with the scene: not readable, or without the edit."""
+    """Fault of the scene: not readable, or without the edit."""
     found = scene_problem(folder, 0)
     if found is None and said >= 1 and not len(Scene.open(folder / "scene").edits):
         found = "lost: the edit"
@@ -196,7 +196,7 @@ def _old_curve() -> tempfile.TemporaryDirectory[str]:
 
 
 def _curve_problem(folder: Path, said: int) -> str | None:
-    """What is wrong with a curve, its table or its scene."""
+    """Fault of a curve, its table or its scene."""
     if not (folder / "curve.csv").read_text().startswith("seconds,"):
         return "unreadable: the curve is cut off"
     return table_problem("curve.md")(folder, said) or scene_problem(folder, 0, "new")
@@ -212,7 +212,7 @@ LINES: dict[str, Command] = {
     "edit --append": _line("edit {}/scene {}/e.yaml --append", put_scene, _appended_problem),
     "bench grids": _over_old_file("grids.png", picture_problem("grids.png")),
 }
-"""What writes without kernels."""
+"""Commands that write without kernels."""
 
 SLOW_LINES: dict[str, Command] = {
     "train, voxels": _trained("voxel"),
@@ -237,4 +237,4 @@ SLOW_LINES: dict[str, Command] = {
     "demo": _demo,
     "demo, renames": renamed(_demo, "demo"),
 }
-"""What has kernels, or PyTorch: in new processes."""
+"""Commands with kernels, or PyTorch: in new processes."""

@@ -3,8 +3,8 @@
 Or in the middle of the n-th write, with half of its bytes in the file (`write_points`).
 
 A process is forked for each kill, so that what it imports is imported once. Python tells of every such call
-(`sys.addaudithook`) just before it is made; the call after it is the next kill point. What a killed process
-had started becomes a child of this one (Linux), which sees how long that goes on.
+(`sys.addaudithook`) just before it is made; the call after it is the next kill point. A process that a
+killed one had started becomes a child of this one (Linux), which sees how long that goes on.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def forked(
 
 
 def started(name: str, folder: Path, at: int, after: float | None = None, *, writes: bool = False) -> Ended:
-    """The same of a command with kernels, whose threads no forked process has: in a new one."""
+    """End of a command with kernels, in a new process: a forked one has none of their threads."""
     reading, writing = os.pipe()
     others = adopted()
     script = str(Path(__file__).with_name("killed_command.py"))
@@ -139,7 +139,7 @@ def children(process: int) -> set[int]:
 def outliving(others: Collection[int], longest: float) -> tuple[int, float]:
     """(children beside `others` that are there after `longest` seconds, seconds that the last was there).
 
-    Those are then killed.
+    Children that are left are then killed.
     """
     begun = time.monotonic()
     while left := _living(children(os.getpid()).difference(others)):
@@ -155,7 +155,7 @@ def outliving(others: Collection[int], longest: float) -> tuple[int, float]:
 
 
 def _living(processes: Collection[int]) -> set[int]:
-    """Those of this process's children that have not ended; those that have are taken from the system."""
+    """Children of this process that have not ended; ended ones are taken from the system."""
     living = set()
     for process in processes:
         with contextlib.suppress(ChildProcessError):

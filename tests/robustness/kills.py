@@ -23,7 +23,7 @@ ALL = {**COMMANDS, **SLOW_COMMANDS}
 
 @dataclass
 class Killed:
-    """What came of some kills."""
+    """Counts of kills."""
 
     kills: int = 0
     lost: int = 0

@@ -1,9 +1,9 @@
 """Readers whose honest seeds are large, so that what reading one takes is what its file holds.
 
-Those of `readers.py` where a file's size can drive memory: beside small seeds SLACK hides what a damaged file
-takes. Left out is what is small whenever it is honest: configs, tokens, locks, certificates, the transform of
-a data parser, messages (1 MiB; the edits in one are read as those of a file), and videos, of which ffmpeg
-reads the frames and this process the beginning.
+Readers of `readers.py` where a file's size can drive memory: beside small seeds SLACK hides what a damaged
+file takes. Left out is what is small whenever it is honest: configs, tokens, locks, certificates, the
+transform of a data parser, messages (1 MiB; the edits in one are read as those of a file), and videos, of
+which ffmpeg reads the frames and this process the beginning.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ _GZIP_BOMB = b""
 
 
 def gzip_content(content: bytes, chance: random.Random) -> bytes:
-    """What a gzip holds damaged; sometimes a bomb is added."""
+    """Content of a gzip, damaged; sometimes a bomb is added."""
     global _GZIP_BOMB
     plain = gzip.decompress(content)
     if chance.random() < 0.03:

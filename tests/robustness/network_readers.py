@@ -65,7 +65,7 @@ nerf:
 
 
 def _import_networks(folder: Path) -> None:
-    """What `cagefield import` makes of a checkpoint, but for the baking."""
+    """Field that `cagefield import` makes of a checkpoint, before the baking."""
     from cagefield.formats.nerf.nerf_pytorch import read_checkpoint as read
     from cagefield.formats.nerf.nerf_pytorch_config import SamplingSettings
     from cagefield.scene.import_nerf_pytorch import import_nerf

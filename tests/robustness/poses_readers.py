@@ -1,4 +1,4 @@
-"""What finding poses keeps for its next run, and videos: honest seeds, and how they are read."""
+"""Files that finding poses keeps for its next run, and videos: honest seeds, and how they are read."""
 
 from __future__ import annotations
 

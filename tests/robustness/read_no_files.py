@@ -6,6 +6,7 @@ python read_no_files.py FOLDER [READER ...]: prints one line of JSON for each of
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import resource
 import signal
@@ -42,7 +43,7 @@ KINDS: dict[str, Callable[[Path], None]] = {
     "hole": _hole,
     "begun, then a hole": _rest_is_a_hole,
 }
-"""What makes each of them where no file is; the last has an honest file's beginning."""
+"""Makers of each of them where no file is; the last has an honest file's beginning."""
 
 
 def main(folder: Path, names: list[str]) -> None:
@@ -59,6 +60,8 @@ def main(folder: Path, names: list[str]) -> None:
         place.mkdir()
         reader.make(place)
         reader.read(place)
+        gc.collect()
+        gc.freeze()  # modules, through which every later collection would go
         limit = _now("VmData") + MOST
         resource.setrlimit(resource.RLIMIT_DATA, (limit, resource.RLIM_INFINITY))
         for part in reader.damaged:
@@ -87,7 +90,7 @@ def _interrupt(*_: object) -> None:
 
 
 class InterruptedWaitError(BaseException):
-    """What was read did not end."""
+    """A read that did not end."""
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What the readers that are attacked share: their form, and edits and keyframes to begin with."""
+"""Parts that the attacked readers share: their form, and edits and keyframes to begin with."""
 
 from __future__ import annotations
 

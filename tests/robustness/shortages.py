@@ -1,4 +1,4 @@
-"""What disks run out of: bytes, names, a quota of either, or room that is missed only at the end."""
+"""Shortages of disks: bytes, names, a quota of either, or room that is missed only at the end."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Shortage:
         """There is enough on a disk, and `taken` can tell."""
 
     def taken(self, folder: Path) -> int:
-        """What the disk holds now, or what has been written to it since `begin`."""
+        """Bytes that the disk holds now, or that were written to it since `begin`."""
         return used(folder)
 
     def limit(self, folder: Path, left: int) -> None:

@@ -19,13 +19,13 @@ from editor_server import EditorServer, page
 
 @dataclass
 class Sample:
-    """What the editor's processes take up at a moment."""
+    """Memory and handles of the editor's processes at a moment."""
 
     seconds: float
     server: int
     """Bytes in memory of the process that pages talk to."""
     rendering: int
-    """The same of those that it has started."""
+    """Bytes in memory of the processes that it has started."""
     threads: int
     files: int
     """Open file handles; both of all processes together."""
@@ -33,7 +33,7 @@ class Sample:
 
 
 def sample(server: EditorServer, begun: float) -> Sample:
-    """What they take up now."""
+    """Usage of the processes now."""
     own = server.process.pid
     processes = [own, *server.children()]
     return Sample(
@@ -53,7 +53,7 @@ def _bytes(process: int) -> int:
 
 @dataclass
 class Soak:
-    """What the pages did, and what was wrong."""
+    """Counts of the pages' actions, and faults."""
 
     server: EditorServer
     out: Path
@@ -64,7 +64,7 @@ class Soak:
     """Seconds that a page stays, at most."""
     done: collections.Counter[str] = field(default_factory=collections.Counter)
     refused: collections.Counter[str] = field(default_factory=collections.Counter)
-    """What pages' users were told, by its first words."""
+    """Messages to the pages' users, by their first words."""
     faults: list[str] = field(default_factory=list)
     """Pages that the editor closed, and answers that did not come."""
     over: threading.Event = field(default_factory=threading.Event)

@@ -86,7 +86,7 @@ class Visit:
 
     @property
     def edits(self) -> list[dict[str, Any]]:
-        """Those of the last state."""
+        """Edits of the last state."""
         found: list[dict[str, Any]] = self.state["edits"]
         return found
 

@@ -28,10 +28,22 @@ INPUTS = 1
 """Inputs of each reader with every change; nightly runs of the benchmark try 200."""
 
 
+SLOW = ("training, voxels", "training, splats", "training, nerf", "usda", "usdc", "usdz")
+"""Readers whose honest seeds are trained, or that read in a process of their own."""
+
+
 @pytest.fixture(scope="module")
 def outcomes() -> dict[str, Outcome]:
-    """What came of some inputs of every reader, all in one process."""
-    return attack([name for name in READERS if _why_not(name) is None], 0, INPUTS, "tests")
+    """Outcomes of some inputs of every reader but the slow ones, all in one process."""
+    return attack(
+        [name for name in READERS if name not in SLOW and _why_not(name) is None], 0, INPUTS, "tests"
+    )
+
+
+@pytest.fixture(scope="module")
+def slow_outcomes() -> dict[str, Outcome]:
+    """Outcomes of some inputs of the slow readers, all in one process."""
+    return attack([name for name in SLOW if _why_not(name) is None], 0, INPUTS, "tests")
 
 
 def _why_not(name: str) -> str | None:
@@ -43,8 +55,19 @@ def _why_not(name: str) -> str | None:
     return None
 
 
-@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("name", [name for name in READERS if name not in SLOW])
 def test_damaged_files(name: str, outcomes: dict[str, Outcome]) -> None:
+    check_outcome(name, outcomes)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", SLOW)
+def test_damaged_files_of_slow_readers(name: str, slow_outcomes: dict[str, Outcome]) -> None:
+    check_outcome(name, slow_outcomes)
+
+
+def check_outcome(name: str, outcomes: dict[str, Outcome]) -> None:
+    """All inputs of a reader were refused or read, without faults; skips where it cannot be tested."""
     if (reason := _why_not(name)) is not None:
         pytest.skip(reason)
     found = outcomes[name]

@@ -39,7 +39,7 @@ def _library() -> tempfile.TemporaryDirectory[str]:
 
 
 def preloading() -> dict[str, str]:
-    """What to add to the environment of a process whose writes, and its children's, are to be limited."""
+    """Variables for the environment of a process whose writes, and its children's, are to be limited."""
     name = _library().name
     return {"LD_PRELOAD": f"{name}/write_limits.so", ENVIRONMENT: f"{name}/limits"}
 

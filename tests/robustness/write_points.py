@@ -35,7 +35,7 @@ def _library() -> tempfile.TemporaryDirectory[str]:
 
 
 def preloading() -> dict[str, str]:
-    """What to add to the environment of a process whose writes are to be counted."""
+    """Variables for the environment of a process whose writes are to be counted."""
     if is_loaded():
         return {}  # its children have it too
     return {"LD_PRELOAD": f"{_library().name}/write_points.so"}

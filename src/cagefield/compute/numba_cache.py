@@ -2,7 +2,8 @@
 
 Numba sees that a kernel on the disk is stale by the source of its own module alone, although functions and
 constants of other modules are compiled into the kernel. So the cache folder has the name of a digest of all
-packages with Numba kernels, and of the packages above them, from which kernels take constants.
+packages with Numba kernels, and of the packages above them, from which kernels take constants; the time of
+a module's file, which each installation changes, does not count.
 """
 
 from __future__ import annotations
@@ -53,6 +54,8 @@ def _keep(kernel: Any, folder: Path) -> None:
         return
     finally:
         numba.config.CACHE_DIR = before
+    # The folder's name has a digest of the source: a new installation of the same source loads its kernels.
+    kernel._cache._cache_file._source_stamp = folder.name
     for name in ("load_overload", "save_overload"):
         setattr(kernel._cache, name, _forgiven(getattr(kernel._cache, name), folder))
 
