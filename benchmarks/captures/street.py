@@ -64,15 +64,18 @@ class Street:
 
     def shoot(self, origin: Array, directions: Array) -> tuple[Float32, Float32]:
         """(rgb [N,3], distance [N]) along unit directions [N,3]."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            to_low = (self.boxes[:, 0] - origin) / directions[:, None]
-            to_high = (self.boxes[:, 1] - origin) / directions[:, None]
-        enter = np.nanmax(np.minimum(to_low, to_high), axis=2)
-        leave = np.nanmin(np.maximum(to_low, to_high), axis=2)
-        t = np.where((enter < leave) & (enter > 0.0), enter, np.inf)
-        t[:, self.kinds == 2] = leave[:, self.kinds == 2]
-        owner = t.argmin(axis=1)
-        distance = t[np.arange(len(t)), owner]
+        inverse = 1.0 / np.where(directions == 0.0, 1e-12, directions).T
+        distance = np.full(len(directions), np.inf)
+        owner = np.zeros(len(directions), np.intp)
+        for number, (box, kind) in enumerate(zip(self.boxes, self.kinds, strict=True)):
+            enter, leave = np.full(len(directions), -np.inf), np.full(len(directions), np.inf)
+            for axis in range(3):
+                ends = (box[:, axis, None] - origin[axis]) * inverse[axis]
+                np.maximum(enter, np.minimum(ends[0], ends[1]), out=enter)
+                np.minimum(leave, np.maximum(ends[0], ends[1]), out=leave)
+            t = leave if kind == 2 else np.where((enter < leave) & (enter > 0.0), enter, np.inf)
+            nearer = t < distance
+            distance[nearer], owner[nearer] = t[nearer], number
         points = origin + distance[:, None] * directions
         return self._colors(points, owner), distance.astype(np.float32)
 

@@ -5,11 +5,11 @@
 
 FILES are checkpoints of `train_tensorf` and `train_nerfacto`, trained on DATA, and those of
 `written_fields`. Pictures by the authors' code lie beside them (.npz of rgb [V,H,W,3]: the first test views
-of DATA, or views with their own c2w [V,4,4] and lens [V,6]). Columns: the file, and by whose code it was
-written; its first view by the authors' code against ours, every fourth pixel each way; one continuous and
-one discrete edit, exact against the baked voxels at SIZE x SIZE, with the processor time of one exact and
-one baked picture; the peak memory of the file's own process. An svox2 grid is the editor's voxels, nothing
-is baked: its exact picture evaluates the edits at every sample.
+of DATA, or views with their own c2w [V,4,4] and lens [V,6] in the field's world). Columns: the file, and by
+whose code it was written; its first view by the authors' code against ours, every fourth pixel each way;
+one continuous and one discrete edit, exact against the baked voxels at SIZE x SIZE, with the processor time
+of one exact and one baked picture; the peak memory of the file's own process. An svox2 grid is the editor's
+voxels, nothing is baked: its exact picture evaluates the edits at every sample.
 """
 
 from __future__ import annotations
@@ -77,16 +77,16 @@ def row(path: Path, data: Path | None) -> str:
     if found is None:
         raise SystemExit(f"{path} is no field of another program")
     theirs = pictures_of(path)
-    trained = theirs is not None and "c2w" not in theirs
-    cameras = cameras_of(found, load_dataset(data) if trained and data is not None else None)["test"]
-    if theirs is not None and not trained:
+    own = theirs is not None and "c2w" in theirs
+    cameras = cameras_of(found, load_dataset(data) if data is not None and not own else None)["test"]
+    if theirs is not None and own:
         fx, fy, cx, cy, width, height = theirs["lens"][0].tolist()
         cameras = (Camera(theirs["c2w"][0], int(width), int(height), fx, fy, cx, cy),)
     scene = scene_of(found, cameras)
     if theirs is None:
         maker, agreement = "our own writer of the layout", "none"
     else:
-        maker = "authors' code" + (", trained" if trained else ", values not trained")
+        maker = "authors' code" + (", values not trained" if "untrained" in theirs else ", trained")
         agreement = f"{against_authors(theirs['rgb'][0], scene, cameras[0]):.1f} dB"
     columns = [
         found.description,

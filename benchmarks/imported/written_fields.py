@@ -214,6 +214,7 @@ def write_svox2(path: Path, sources: Path | None) -> None:
         path.with_name(f"{path.stem}_pictures.npz"),
         rgb=np.clip(rgb.reshape(1, camera.height, camera.width, 3), 0.0, 1.0),
         c2w=camera.c2w[None],
+        untrained=True,
         lens=np.array([[camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height]]),
     )
 
