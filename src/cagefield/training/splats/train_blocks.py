@@ -32,7 +32,7 @@ from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.training.splats.train_splats import train_splat
 
 OnStage = Callable[[str, float, str], None]
-_MAX_RECORD_BYTES = 1 << 26
+_MAX_RECORD_BYTES = 1 << 22
 
 
 @dataclass(frozen=True)
