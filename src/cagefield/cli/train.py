@@ -61,7 +61,7 @@ class Train:
     """Most splats at the end; left out, as many as the photos and the time allow."""
     blocks: int | None = None
     """Train splats in so many blocks of space, one after another, each on the photos that see it, and merge
-    them: for captures larger than the memory. --splats and the time of a block are those of its photos."""
+    them: for captures larger than the memory. A block has its photos' share of --splats and of the time."""
     cluster: str | None = None
     """Train the blocks on a cluster of dask.distributed, as `cagefield render`; photos and the scene's folder
     are on a disk that its machines share."""

@@ -2,7 +2,7 @@
 
 A folder keeps the finished blocks, `block-0001.safetensors` with `block-0001.json`, and the checkpoint of
 the block in training, so that a training goes on where it stopped. One block is in memory at a time. Each
-gets as many steps for each of its photos as a training of the whole capture would.
+gets as many steps and splats for each of its photos as a training of the whole capture would.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.training.splats.train_splats import train_splat
 
 OnStage = Callable[[str, float, str], None]
+MIN_SPLATS = 100
+"""Minimum of a block's maximum number of splats."""
 _MAX_RECORD_BYTES = 1 << 22
 
 
@@ -102,6 +104,7 @@ def plan_blocks(
             config,
             steps=max(1, round(config.steps * share)),
             minutes=None if config.minutes is None else config.minutes * share,
+            splats=None if config.splats is None else max(MIN_SPLATS, round(config.splats * share)),
         )
         photos = block_dataset(dataset, points, block)
         jobs.append(BlockJob(number, photos, part, folder, _key(block, part, dataset)))
