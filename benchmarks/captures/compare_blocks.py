@@ -94,8 +94,8 @@ def draw(options: Any) -> None:
         raise SystemExit("the capture has no points")
     blocks = divide(dataset, points, options.blocks)
     fields = [SplatField.load(options.out / f"field-{count}.safetensors") for count in (1, options.blocks)]
-    seen = visible_points(dataset.test, dataset.points or points)
     positions = (dataset.points or points).positions
+    seen = visible_points(dataset.test, dataset.points or points).toarray().astype(bool)
     for view, _ in sorted(
         zip(dataset.test, seen, strict=True), key=lambda pair: -_both_sides(blocks, positions[pair[1]])
     )[:PICTURES]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
 from cagefield.cameras.camera import Camera
@@ -79,7 +80,7 @@ class Street:
         points = origin + distance[:, None] * directions
         return self._colors(points, owner), distance.astype(np.float32)
 
-    def _colors(self, points: Array, owner: Array) -> Float32:
+    def _colors(self, points: Array, owner: NDArray[np.intp]) -> Float32:
         """rgb [N,3] at surface points [N,3] of boxes [N], lit from above and from +x."""
         low, high = self.boxes[owner, 0], self.boxes[owner, 1]
         gaps = np.minimum(np.abs(points - low), np.abs(points - high))

@@ -37,7 +37,7 @@ from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.scene.import_external import cameras_of
 from cagefield.scene.scene import Scene
 
-STRIDE, SIZE, BAKED = 4, 48, 96
+STRIDE, SIZE, BAKED = 4, 32, 64
 """Pixels between two that are compared with the authors'; width of edited pictures; baked voxels."""
 
 HEADER = (

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ OVERLAP = 0.15
 """Growth of a core at its inner planes, as a share of its extent among the points."""
 MIN_POINTS = 10
 """Minimum number of a region's points that a photo of the block sees."""
-MIN_SHARE = 0.1
+MIN_SHARE = 0.25
 """Minimum share of the points that a photo sees which are the region's."""
 MAX_BLOCKS = 10_000
 
@@ -45,8 +46,8 @@ class Block:
         core: [2,3] half-open cell, world units; infinite on the outside.
         region: [2,3] the core grown at its inner planes.
         photos: numbers of the training photos, ascending.
-        points: rows of the points in the region, ascending.
-        core_points: number of points in the core.
+        points: rows of the points that two of its photos see, ascending.
+        core_points, region_points: numbers of points in the core and in the region.
     """
 
     core: Array
@@ -54,6 +55,7 @@ class Block:
     photos: tuple[int, ...]
     points: NDArray[np.int64]
     core_points: int
+    region_points: int
 
     def contains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
         """Mask [N] of positions [N,3] in the core."""
@@ -61,7 +63,7 @@ class Block:
 
     def describe(self) -> str:
         """Photos and points."""
-        more = len(self.points) - self.core_points
+        more = self.region_points - self.core_points
         return f"{len(self.photos)} photos, {self.core_points} points and {more} around them"
 
 
@@ -75,19 +77,19 @@ def divide(dataset: Dataset, points: SparsePoints, count: int) -> tuple[Block, .
         raise CagefieldError(f"blocks is {count}; give a number from 1 to {MAX_BLOCKS}")
     everything = np.array([[-np.inf] * 3, [np.inf] * 3])
     if count == 1:
-        photos = tuple(range(len(dataset.train)))
-        return (Block(everything, everything, photos, np.arange(len(points)), len(points)),)
+        photos, rows = tuple(range(len(dataset.train))), np.arange(len(points))
+        return (Block(everything, everything, photos, rows, len(points), len(points)),)
     if len(points) < count * MIN_POINTS:
         raise CagefieldError(
             f"{dataset.path}: {len(points)} points are too few for {count} blocks; give --blocks "
             f"{max(1, len(points) // MIN_POINTS)} or less"
         )
     seen = visible_points(dataset.train, points)
-    totals = seen.sum(axis=1)
+    totals = np.asarray(seen.sum(axis=1)).ravel()
     cores = partition(points.positions, count)
     regions = [grown(core, points.positions) for core in cores]
-    members = [inside_cell(region, points.positions) for region in regions]
-    counts = np.stack([seen[:, rows].sum(axis=1) for rows in members])
+    members = np.stack([inside_cell(region, points.positions) for region in regions])
+    counts = np.stack([seen @ rows.astype(np.int32) for rows in members])
     chosen = (counts >= MIN_POINTS) & (counts >= MIN_SHARE * totals)
     most = counts.argmax(axis=0)
     chosen[most, np.arange(len(totals))] |= counts.max(axis=0) >= MIN_POINTS
@@ -99,8 +101,9 @@ def divide(dataset: Dataset, points: SparsePoints, count: int) -> tuple[Block, .
                 f"{dataset.path}: block {number + 1} of {count} is seen by {len(photos)} photos; give fewer "
                 "--blocks"
             )
+        shared = np.flatnonzero(np.asarray(seen[list(photos)].sum(axis=0)).ravel() >= 2)
         inside = int(inside_cell(core, points.positions).sum())
-        blocks.append(Block(core, region, photos, np.flatnonzero(rows), inside))
+        blocks.append(Block(core, region, photos, shared, inside, int(rows.sum())))
     return tuple(blocks)
 
 
@@ -143,15 +146,22 @@ def grown(cell: Array, positions: Array) -> Array:
     return cell + np.stack([-margin, margin])
 
 
-def visible_points(views: Sequence[View], points: SparsePoints) -> NDArray[np.bool_]:
-    """[V,M] whether each photo sees each point: as the reconstruction knows it, else by the frustum."""
+def visible_points(views: Sequence[View], points: SparsePoints) -> Any:
+    """Sparse matrix int32 [V,M], 1 where a photo sees a point: as the reconstruction knows it, else by the
+    frustum.
+    """
+    from scipy.sparse import csr_matrix
+
     if points.seen_by:
         numbers = {view.name: n for n, view in enumerate(views)}
-        seen = np.zeros((len(views), len(points)), bool)
-        for row, names in enumerate(points.seen_by):
-            seen[[numbers[name] for name in names if name in numbers], row] = True
-        return seen
-    return np.stack([_in_frustum(view, points.positions) for view in views])
+        photos = np.fromiter((numbers.get(name, -1) for names in points.seen_by for name in names), np.int64)
+        rows = np.repeat(np.arange(len(points)), [len(names) for names in points.seen_by])
+        photos, rows = photos[photos >= 0], rows[photos >= 0]
+    else:
+        found = [np.flatnonzero(_in_frustum(view, points.positions)) for view in views]
+        photos = np.repeat(np.arange(len(views)), [len(part) for part in found])
+        rows = np.concatenate(found)
+    return csr_matrix((np.ones(len(rows), np.int32), (photos, rows)), shape=(len(views), len(points)))
 
 
 def _in_frustum(view: View, positions: Array) -> NDArray[np.bool_]:
@@ -170,8 +180,7 @@ def block_dataset(dataset: Dataset, points: SparsePoints, block: Block) -> Datas
     if len(block.photos) == len(dataset.train):
         return replace(dataset, points=points)
     train = tuple(dataset.train[n] for n in block.photos)
-    rows = visible_points(train, points).sum(axis=0) >= 2
-    return replace(dataset, train=train, test=(), val=(), points=points.take(rows))
+    return replace(dataset, train=train, test=(), val=(), points=points.take(block.points))
 
 
 def left_out(dataset: Dataset, blocks: Sequence[Block]) -> tuple[str, ...]:
