@@ -13,8 +13,8 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.training.splats import train_blocks as training
 from cagefield.training.splats.blocks import (
-    MIN_POINTS,
-    MIN_SHARE,
+    MIN_BLOCK_POINTS,
+    MIN_PHOTO_SHARE,
     Block,
     align_gains,
     block_dataset,
@@ -97,7 +97,7 @@ def test_photos_that_see_enough_of_a_block_are_chosen(capture: Dataset) -> None:
                 counts[number] += inside and view.name in names
         total = sum(view.name in names for names in points.seen_by)
         for number, count in enumerate(counts):
-            if count >= MIN_POINTS and (count >= MIN_SHARE * total or count == max(counts)):
+            if count >= MIN_BLOCK_POINTS and (count >= MIN_PHOTO_SHARE * total or count == max(counts)):
                 chosen[number].add(n)
     assert [set(block.photos) for block in blocks] == list(chosen.values())
     assert 1 < len(chosen[0]) < len(capture.train)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 MAX_LEVEL = 16
 """Finest level of the octree: 65,536 voxels along an edge."""
-_LINE = (1 << MAX_LEVEL) + 1
+_LATTICE_POINTS = (1 << MAX_LEVEL) + 1
 """Lattice points of level 16 along an edge."""
 
 
@@ -108,7 +108,7 @@ class SvrasterField(ExternalField):
         edges = np.int64(1) << (MAX_LEVEL - self.levels.astype(np.int64))
         octants = np.array(list(np.ndindex(2, 2, 2)), np.int64)
         at = low[:, None] + edges[:, None, None] * octants
-        keys = (at[..., 0] * _LINE + at[..., 1]) * _LINE + at[..., 2]
+        keys = (at[..., 0] * _LATTICE_POINTS + at[..., 1]) * _LATTICE_POINTS + at[..., 2]
         return np.unique(keys, return_inverse=True)[1].reshape(keys.shape).astype(np.int64)
 
     @property

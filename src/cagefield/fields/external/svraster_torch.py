@@ -13,10 +13,10 @@ from cagefield.fields.external.torch_field import DensityAt, RaySamples, TorchFi
 from cagefield.fields.sh import sh_basis
 
 MAX_LEVEL = 16
-MAX_PLANES = 1 << 10
+MAX_RAY_PLANES = 1 << 10
 """Maximum number of planes along each axis in the cube of interest, and in each shell around it."""
 DENSITY_SCALE = 100.0
-KNEE = 1.1
+LINEAR_START = 1.1
 
 
 class TorchSvraster(TorchField):
@@ -60,7 +60,11 @@ class TorchSvraster(TorchField):
             weight = x if octant & 4 else 1.0 - x
             weight = weight * (y if octant & 2 else 1.0 - y) * (z if octant & 1 else 1.0 - z)
             total = total + weight * self._corners[rows, octant]
-        value = torch.where(total > KNEE, total, KNEE * torch.exp(total.clamp_max(KNEE) / KNEE - 1.0))
+        value = torch.where(
+            total > LINEAR_START,
+            total,
+            LINEAR_START * torch.exp(total.clamp_max(LINEAR_START) / LINEAR_START - 1.0),
+        )
         return torch.where(inside, DENSITY_SCALE * value, torch.zeros_like(value))
 
     def color(self, positions: Tensor, viewdirs: Tensor) -> Tensor:
@@ -97,7 +101,7 @@ class TorchSvraster(TorchField):
         start = float(self._low[axis])
         edge = self.extent * 0.5**self.finest
         low, high = (float(value) for value in inner[:, axis])
-        edge *= 2.0 ** max(0, np.ceil(np.log2((high - low) / edge / MAX_PLANES)))
+        edge *= 2.0 ** max(0, np.ceil(np.log2((high - low) / edge / MAX_RAY_PLANES)))
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         bottom, top = (float(value) for value in outer[:, axis])
         found: list[np.ndarray[tuple[int], np.dtype[np.float64]]] = []

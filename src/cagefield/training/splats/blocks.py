@@ -31,9 +31,9 @@ from cagefield.typing import Array
 
 OVERLAP = 0.15
 """Growth of a core at its inner planes, as a share of its extent among the points."""
-MIN_POINTS = 10
+MIN_BLOCK_POINTS = 10
 """Minimum number of a region's points that a photo of the block sees."""
-MIN_SHARE = 0.25
+MIN_PHOTO_SHARE = 0.25
 """Minimum share of the points that a photo sees which are the region's."""
 MAX_BLOCKS = 10_000
 
@@ -79,10 +79,10 @@ def divide(dataset: Dataset, points: SparsePoints, count: int) -> tuple[Block, .
     if count == 1:
         photos, rows = tuple(range(len(dataset.train))), np.arange(len(points))
         return (Block(everything, everything, photos, rows, len(points), len(points)),)
-    if len(points) < count * MIN_POINTS:
+    if len(points) < count * MIN_BLOCK_POINTS:
         raise CagefieldError(
             f"{dataset.path}: {len(points)} points are too few for {count} blocks; give --blocks "
-            f"{max(1, len(points) // MIN_POINTS)} or less"
+            f"{max(1, len(points) // MIN_BLOCK_POINTS)} or less"
         )
     seen = visible_points(dataset.train, points)
     totals = np.asarray(seen.sum(axis=1)).ravel()
@@ -90,9 +90,9 @@ def divide(dataset: Dataset, points: SparsePoints, count: int) -> tuple[Block, .
     regions = [grown(core, points.positions) for core in cores]
     members = np.stack([inside_cell(region, points.positions) for region in regions])
     counts = np.stack([seen @ rows.astype(np.int32) for rows in members])
-    chosen = (counts >= MIN_POINTS) & (counts >= MIN_SHARE * totals)
+    chosen = (counts >= MIN_BLOCK_POINTS) & (counts >= MIN_PHOTO_SHARE * totals)
     most = counts.argmax(axis=0)
-    chosen[most, np.arange(len(totals))] |= counts.max(axis=0) >= MIN_POINTS
+    chosen[most, np.arange(len(totals))] |= counts.max(axis=0) >= MIN_BLOCK_POINTS
     blocks = []
     for number, (core, region, rows) in enumerate(zip(cores, regions, members, strict=True)):
         photos = tuple(int(n) for n in np.flatnonzero(chosen[number]))
