@@ -169,8 +169,10 @@ def test_merged_splats_are_those_in_the_cores() -> None:
 
 
 def same(a: SplatField, b: SplatField) -> bool:
-    names = ("means", "log_scales", "quaternions", "opacities", "sh")
-    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in names)
+    """Equal arrays; quaternions, which a file's reader normalizes once more, up to their last bits."""
+    names = ("means", "log_scales", "opacities", "sh")
+    equal = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in names)
+    return equal and len(a) == len(b) and float(np.abs(a.quaternions - b.quaternions).max()) < 1e-6
 
 
 @pytest.mark.train
@@ -180,7 +182,7 @@ def test_one_block_is_the_training_without_blocks(capture: Dataset, tmp_path: Pa
     merged = train_blocks(capture, blocks, jobs)
     assert same(merged.field, alone.field) and merged.steps == alone.steps == 60
     np.testing.assert_array_equal(merged.gains, alone.gains)
-    assert merged.test_psnr == alone.test_psnr and merged.finished
+    assert merged.test_psnr == pytest.approx(alone.test_psnr, abs=1e-3) and merged.finished
 
 
 @pytest.mark.train
