@@ -80,6 +80,9 @@ class BenchEdits:
     only_pictures: Flag = False
     """Write the pictures and no table."""
     device: Device = "auto"
+    cluster: str | None = None
+    """Train and measure on a cluster of dask.distributed, as `cagefield render`; the work folder is shared by
+    its machines. Frame times are then those of several processes at once."""
     overwrite: Flag = False
     """Replace files that are there."""
 
@@ -95,6 +98,8 @@ class BenchEdits:
         check_known(self.methods)
         if self.field != "nerf" and self.preset != "auto":
             raise CagefieldError("--preset is for the original NeRF; give --field nerf too")
+        if self.cluster is not None and not self.no_methods:
+            raise CagefieldError("methods are compared on one machine; give --no-methods with --cluster")
         if self.field != "voxel" and not self.no_methods:
             raise CagefieldError(
                 f"methods are compared on voxels only; give --no-methods with --field {self.field}"
@@ -150,8 +155,15 @@ class BenchEdits:
         from benchmarks.edits.edit_quality import measure
         from benchmarks.edits.edits_table import table
 
-        scores = []
-        for score in measure(cases, bench, taught=self.taught):
+        scores, measured = [], measure(cases, bench, taught=self.taught)
+        if self.cluster is not None:
+            from benchmarks.edits.edits_cluster import measure_on
+            from cagefield.cluster.connection import parse_cluster
+
+            measured = measure_on(
+                parse_cluster(self.cluster), cases, bench, taught=self.taught, device=self.device
+            )
+        for score in measured:
             scores.append(score)
             figures = score.figures
             print(

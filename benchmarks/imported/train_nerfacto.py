@@ -7,8 +7,8 @@
 
 Model, losses, sampling, config.yml and checkpoint are nerfstudio's; the loop below only steps optimizers.
 Beside the checkpoint's folder, renders.npz has views as nerfstudio renders them: rgbN [H,W,3], accN [H,W,1],
-c2wN [3,4] and kN (fx, fy, cx, cy, width, height). step-*_pictures.npz has rgb [V,H,W,3] for
-`external_fields`.
+c2wN [3,4] and kN (fx, fy, cx, cy, width, height). step-*_pictures.npz has rgb [V,H,W,3], c2w
+[V,4,4] and lens [V,6] for `external_fields`.
 """
 
 from __future__ import annotations
@@ -48,7 +48,10 @@ def main() -> None:
     np.savez(folder / "renders.npz", **views)
     pictures = np.stack([views[f"rgb{index}"] for index in range(len(views) // 4)])
     models = folder / "nerfstudio_models"
-    np.savez(models / f"step-{options.iterations - 1:09d}_pictures.npz", rgb=pictures)
+    poses = np.stack([np.vstack([views[f"c2w{index}"], [0, 0, 0, 1]]) for index in range(len(pictures))])
+    lenses = np.stack([views[f"k{index}"] for index in range(len(pictures))])
+    beside = models / f"step-{options.iterations - 1:09d}_pictures.npz"
+    np.savez(beside, rgb=pictures, c2w=poses, lens=lenses)
     print(folder)
 
 

@@ -11,6 +11,7 @@ from reader_seeds import Reader
 
 from plenoctree_files import plenoctree_arrays, write_plenoctree
 from svox2_files import svox2_arrays, write_svox2
+from svraster_files import svraster_content, write_svraster
 from tensorf_files import tensorf_content, write_tensorf
 
 
@@ -33,6 +34,20 @@ def _tensorf(model: str, shading: str) -> Callable[[Path], None]:
         write_tensorf(folder / "a.th", tensorf_content(model, shading))
 
     return make
+
+
+def _svraster(quantized: bool) -> Callable[[Path], None]:
+    def make(folder: Path) -> None:
+        write_svraster(folder / "a.pt", svraster_content(outside=0, quantized=quantized))
+
+    return make
+
+
+def _make_svraster_field(folder: Path) -> None:
+    from cagefield.fields.external.external_file import save_external
+    from cagefield.formats.external.svraster import read_svraster
+
+    save_external(read_svraster(svraster_content(outside=0)).field, folder / "a.safetensors")  # type: ignore[arg-type]
 
 
 def _make_field(folder: Path) -> None:
@@ -69,7 +84,16 @@ EXTERNAL_READERS: dict[str, Reader] = {
     "TensoRF .th, lines": Reader(_tensorf("TensorCP", "SH"), _read("a.th"), {"a.th": "zip"}),
     "original, TensoRF": Reader(_make_field, _read_field, {"a.safetensors": "safetensors"}),
     "PlenOctree .npz": Reader(_plenoctree, _read("a.npz"), {"a.npz": "zip"}),
+    "SVRaster .pt": Reader(_svraster(False), _read("a.pt"), {"a.pt": "zip"}),
+    "SVRaster .pt, quantized": Reader(_svraster(True), _read("a.pt"), {"a.pt": "zip"}),
+    "original, SVRaster": Reader(_make_svraster_field, _read_field, {"a.safetensors": "safetensors"}),
     "svox2 .npz": Reader(_svox2(False), _read("a.npz"), {"a.npz": "zip"}),
     "svox2 .npz, deflated": Reader(_svox2(True, **_BACKGROUND), _read("a.npz"), {"a.npz": "zip"}),
 }
-EXTERNAL_NEED_TORCH = ("TensoRF .th", "TensoRF .th, lines", "original, TensoRF")
+EXTERNAL_NEED_TORCH = (
+    "TensoRF .th",
+    "TensoRF .th, lines",
+    "original, TensoRF",
+    "SVRaster .pt",
+    "SVRaster .pt, quantized",
+)

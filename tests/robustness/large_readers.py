@@ -11,6 +11,7 @@ from __future__ import annotations
 from functools import partial
 
 from dataset_readers import colmap_readers, llff_reader, picture_readers, points_reader, transforms_reader
+from large_external import LARGE_EXTERNAL_READERS
 from network_readers import network_readers, training_reader
 from poses_readers import work_readers
 from reader_seeds import Reader, many_edits
@@ -39,5 +40,6 @@ READERS: dict[str, Reader] = {
     "text ply": splat_readers(6000)["text ply"],
     **work_readers(4000, 180_000, 60_000, 100_000, 8000),
     **training_readers(80, 40_000, 512),
+    **LARGE_EXTERNAL_READERS,
 }
 """The readers, by their names in `readers.py`."""

@@ -16,6 +16,7 @@ import pytest
 from attack import Outcome, attack, attack_by
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from large_external import LARGE_EXTERNAL_READERS
 from large_readers import READERS as LARGE_READERS
 from readers import NEED_OPENSSL, NEED_TORCH, READERS
 
@@ -117,6 +118,15 @@ def test_large_files_take_twice_as_much_at_most(name: str) -> None:
     found = attack([name], 0, 4, "tests", large=True)[name]
     assert (found.faults, found.tried) == ([], 4)
     assert found.honest > 8 << 20
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", LARGE_EXTERNAL_READERS)
+def test_large_checkpoints_of_other_programs_take_twice_as_much_at_most(name: str) -> None:
+    pytest.importorskip("torch", reason="checkpoints are PyTorch's, which is not installed (extra nerf)")
+    found = attack([name], 0, 4, "tests", large=True)[name]
+    assert (found.faults, found.tried) == ([], 4)
+    assert found.honest > 2 << 20
 
 
 def test_large_readers_are_known() -> None:

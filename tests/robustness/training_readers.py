@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -63,12 +65,33 @@ def _training(kind: str, size: int) -> Reader:
     return Reader(make, read, {STATE: "zip"})
 
 
+def _block(splats: int) -> Reader:
+    """A finished block of a training in blocks: its splats, and its photos' gains."""
+
+    def make(folder: Path) -> None:
+        from splat_scenes import ball_of_splats
+
+        ball_of_splats(splats).save(folder / "block-0001.safetensors")
+        record = {"key": "known", "steps": 9, "seconds": 1.5, "gains": [[1.0, 0.9, 1.1]] * 40}
+        (folder / "block-0001.json").write_text(json.dumps(record), encoding="utf-8")
+
+    def read(folder: Path) -> None:
+        from cagefield.training.splats.splat_config import SplatConfig
+        from cagefield.training.splats.train_blocks import BlockJob, read_block
+
+        dataset: Any = SimpleNamespace(train=(None,) * 40)
+        read_block(BlockJob(0, dataset, SplatConfig(), folder, "known"))
+
+    return Reader(make, read, {"block-0001.json": "json", "block-0001.safetensors": "safetensors"})
+
+
 def training_readers(resolution: int = 16, splats: int = 100, width: int = 8) -> dict[str, Reader]:
     """Of trainings of fields of some size."""
     return {
         "training, voxels": _training("voxel", resolution),
         "training, splats": _training("splat", splats),
         "training, nerf": _training("nerf", width),
+        "training, block": _block(splats),
     }
 
 

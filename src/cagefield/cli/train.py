@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 import sys
 import warnings
 from collections.abc import Iterator
@@ -58,6 +59,12 @@ class Train:
     unbounded, else voxels. nerf is the original NeRF, needs PyTorch, and is baked into voxels at the end."""
     splats: int | None = None
     """Most splats at the end; left out, as many as the photos and the time allow."""
+    blocks: int | None = None
+    """Train splats in so many blocks of space, one after another, each on the photos that see it, and merge
+    them: for captures larger than the memory. A block has its photos' share of --splats and of the time."""
+    cluster: str | None = None
+    """Train the blocks on a cluster of dask.distributed, as `cagefield render`; photos and the scene's folder
+    are on a disk that its machines share."""
     robust: Flag = False
     """Give less weight to regions of photos that contradict the others: people who walk through, a backdrop
     that moves; for splats."""
@@ -87,12 +94,12 @@ class Train:
             if given and self.field not in ("splat", "auto"):
                 raise CagefieldError(f"{option} is for splats; give --field splat too")
         target = check_destination(self.out, self.overwrite or self.resume)
-        checkpoint = target.with_name(target.name + ".training")
+        checkpoint = target.with_name(target.name + (".training" if self.blocks is None else ".blocks"))
         if checkpoint.exists() and not (self.resume or self.overwrite):
             raise CagefieldError(
                 f"{checkpoint} is an interrupted training; give --resume to go on, or --overwrite"
             )
-        if self.resume and not checkpoint.is_file():
+        if self.resume and not checkpoint.exists():
             raise CagefieldError(f"no checkpoint at {checkpoint} to resume from; start anew")
         self._check_options()
         dataset = self.photos.load(target.with_name(target.name + ".poses"), self.training.minutes)
@@ -103,6 +110,20 @@ class Train:
         target.parent.mkdir(parents=True, exist_ok=True)
         if networks is not None:
             scene, figures, finished = self._train_nerf(dataset, networks, checkpoint)
+        elif self.blocks is not None:
+            from cagefield.cli.train_blocks import train_in_blocks
+
+            options = self.training.splat_config(self.splats, self.refine_poses, self.robust)
+            scene, splats = train_in_blocks(
+                dataset,
+                options,
+                self.blocks,
+                checkpoint,
+                anew=not self.resume,
+                cluster=self.cluster,
+                device=self.device,
+            )
+            figures, finished = summary(splats), splats.finished
         elif kind == "splat":
             options = self.training.splat_config(self.splats, self.refine_poses, self.robust)
             scene, splats = train_splats(dataset, options, checkpoint, resume=self.resume)
@@ -118,11 +139,15 @@ class Train:
         if not finished:
             print("stopped early; the same command with --resume continues")
             raise KeyboardInterrupt
-        checkpoint.unlink(missing_ok=True)
+        if self.blocks is None:
+            checkpoint.unlink(missing_ok=True)
+        else:
+            shutil.rmtree(checkpoint, ignore_errors=True)
 
     def _splat_options(self) -> tuple[tuple[str, bool], ...]:
         """Options that splats alone take, and whether they are given."""
         return (
+            ("--blocks", self.blocks is not None),
             ("--refine-poses", self.refine_poses),
             ("--robust", self.robust),
             ("--splats", self.splats is not None),
@@ -130,6 +155,13 @@ class Train:
 
     def _check_options(self) -> None:
         """Refuses, before photos are read, options that no trainer in question takes."""
+        if self.cluster is not None:
+            from cagefield.cluster.connection import check_installed, parse_cluster
+
+            if self.blocks is None:
+                raise CagefieldError("--cluster trains blocks; give --blocks too")
+            parse_cluster(self.cluster)
+            check_installed()
         if self.field in ("auto", "splat"):
             self.training.splat_config(self.splats, self.refine_poses, self.robust)
         # Splats take harmonics of degree 3, voxels do not: with "auto" the photos decide.

@@ -8,16 +8,16 @@ command. Workers hold no state that a frame depends on, so pictures are those of
 from __future__ import annotations
 
 import uuid
-import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import cagefield
 from cagefield.cluster.connection import TlsFiles, connect
 from cagefield.cluster.frame_tasks import FrameJob, FrameResult, fit_depth_scale, render_frame, write_contents
 from cagefield.cluster.scene_archive import SceneArchive, SceneSource
+from cagefield.cluster.tasks import RETRIES, results_of, warned_losses
 from cagefield.errors import CagefieldError
 from cagefield.files.stale_files import hidden_name
 from cagefield.images.pictures import DepthScale
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
     from cagefield.cameras.camera import Camera
-
-RETRIES = 2
-"""Further tries of a frame that fails, a full disk or a network folder that is away for a moment."""
 
 
 class FrameCluster:
@@ -64,30 +61,10 @@ class FrameCluster:
             yield name, result.scale
 
     def _results(self, futures: dict[Future, str]) -> Iterator[tuple[str, FrameResult]]:
-        from distributed import CancelledError, KilledWorker, as_completed
-
-        names = {future.key: name for future, name in futures.items()}
-        waiting = set(futures)
-        futures.clear()  # a result is released once it is here
-        try:
-            for future in as_completed(list(waiting), loop=self.client.loop):
-                name = names[future.key]
-                try:
-                    result: FrameResult = future.result()
-                except KilledWorker as error:
-                    raise CagefieldError(
-                        f"frame {name}: {_losses(error)} workers ended while they rendered it, for want of "
-                        "memory perhaps; use fewer workers, and --keep"
-                    ) from None
-                except CancelledError:
-                    raise CagefieldError("the connection to the cluster is lost; go on with --keep") from None
-                if result.error:
-                    raise CagefieldError(f"frame {name}: {result.error}")
-                waiting.discard(future)
-                yield name, result
-        finally:
-            if waiting:
-                self.client.cancel(list(waiting), force=True)
+        for name, result in results_of(self.client, futures, "frame "):
+            if result.error:
+                raise CagefieldError(f"frame {name}: {result.error}")
+            yield name, result
 
 
 @contextmanager
@@ -125,14 +102,8 @@ def open_frame_cluster(
             archive = SceneArchive.packed(source, scene)
             client.register_plugin(ArchivePlugin(archive), name=archive.name)
             opened.callback(client.unregister_worker_plugin, archive.name)
-        lost = _lost_workers(client)
-        opened.callback(client.unsubscribe_topic, "all")
-        try:
-            yield FrameCluster(client, job)
-        finally:
-            if lost:
-                text = "1 worker was" if len(lost) == 1 else f"{len(lost)} workers were"
-                warnings.warn(f"{text} lost; others rendered their frames", stacklevel=2)
+        opened.enter_context(warned_losses(client, "rendered their frames"))
+        yield FrameCluster(client, job)
 
 
 def _all_see(client: Client, source: SceneSource) -> bool:
@@ -156,20 +127,3 @@ def _all_see(client: Client, source: SceneSource) -> bool:
 def _look(source: SceneSource) -> tuple[str, bool]:
     """Version of cagefield on a worker, and whether the scene folder is there."""
     return cagefield.__version__, source.is_here()
-
-
-def _lost_workers(client: Client) -> list[str]:
-    """Addresses of workers that leave from now on; the list grows."""
-    lost: list[str] = []
-
-    def noted(event: Any) -> None:
-        message = event[1] if isinstance(event, tuple) else event
-        if isinstance(message, dict) and message.get("action") == "remove-worker":
-            lost.append(str(message.get("worker", "")))
-
-    client.subscribe_topic("all", noted)
-    return lost
-
-
-def _losses(error: Exception) -> int:
-    return int(getattr(error, "allowed_failures", 3)) + 1

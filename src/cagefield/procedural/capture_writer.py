@@ -121,7 +121,7 @@ def make_capture(
             )
             values["ply_file_path"] = "sparse_pc.ply"
             _write_ply(tracks, draft / "sparse_pc.ply")
-            _write_colmap(tracks, cameras, names, draft / "colmap/sparse/0")
+            write_colmap(tracks, cameras, names, draft / "colmap/sparse/0")
         (draft / "transforms.json").write_text(json.dumps(values, indent=1), encoding="utf-8")
     return target
 
@@ -170,7 +170,7 @@ def _write_ply(tracks: Tracks, path: Path) -> None:
     path.write_text("\n".join([*header, "end_header", *rows]) + "\n", encoding="utf-8")
 
 
-def _write_colmap(tracks: Tracks, cameras: Sequence[Camera], names: Sequence[str], folder: Path) -> None:
+def write_colmap(tracks: Tracks, cameras: Sequence[Camera], names: Sequence[str], folder: Path) -> None:
     """Write a COLMAP model as text. Source: COLMAP's documentation, "Output format"."""
     folder.mkdir(parents=True)
     first = cameras[0]

@@ -10,6 +10,7 @@ from cagefield.fields.external.external_field import ExternalField
 from cagefield.fields.external.instant_ngp import InstantNgpField
 from cagefield.fields.external.nerfacto import NerfactoField
 from cagefield.fields.external.plenoctree import PlenOctreeField
+from cagefield.fields.external.svraster import SvrasterField
 from cagefield.fields.external.tensorf import TensorfField
 from cagefield.fields.field_files import read_tensors, write_tensors
 from cagefield.files import json_text
@@ -19,7 +20,7 @@ FORMAT_VERSION = "1"
 _CURE = "copy it back or import the checkpoint again"
 
 EXTERNAL_KINDS: dict[str, type[ExternalField]] = {
-    kind.KIND: kind for kind in (TensorfField, PlenOctreeField, NerfactoField, InstantNgpField)
+    kind.KIND: kind for kind in (TensorfField, PlenOctreeField, NerfactoField, InstantNgpField, SvrasterField)
 }
 """Classes of fields by the kind in the header."""
 

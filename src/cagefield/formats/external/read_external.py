@@ -16,6 +16,7 @@ from cagefield.formats.external.instant_ngp import is_instant_ngp, read_instant_
 from cagefield.formats.external.nerfacto import is_nerfacto, read_nerfacto
 from cagefield.formats.external.plenoctree import is_plenoctree, read_plenoctree
 from cagefield.formats.external.svox2 import is_svox2, read_svox2
+from cagefield.formats.external.svraster import is_svraster, read_svraster
 from cagefield.formats.external.tensorf import is_tensorf, read_tensorf
 from cagefield.formats.torch_files import read_torch_tensors
 
@@ -24,7 +25,7 @@ Headers = dict[str, tuple[tuple[int, ...], np.dtype[Any]]]
 
 _TORCH: tuple[
     tuple[Callable[[Mapping[str, Any]], bool], Callable[[Mapping[str, Any]], ExternalCheckpoint]], ...
-] = ((is_tensorf, read_tensorf),)
+] = ((is_tensorf, read_tensorf), (is_svraster, read_svraster))
 """(test, reader) of dictionaries that `torch.save` wrote."""
 
 _NPZ: tuple[tuple[Callable[[Headers], bool], Callable[[Path, Headers], ExternalCheckpoint]], ...] = (

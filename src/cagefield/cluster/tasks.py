@@ -1,0 +1,114 @@
+"""Named tasks on a cluster's workers: functions of picklable arguments, whose results come back.
+
+A task of a lost worker is given to another one; so a task writes its files whole, and may run twice.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from cagefield.cluster.connection import TlsFiles, connect
+from cagefield.errors import CagefieldError
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+RETRIES = 2
+"""Further tries of a task that fails, for a full disk or a network folder that is away for a moment."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A function of a module that workers can import, and its arguments."""
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...] = ()
+
+
+def run_tasks(
+    cluster: int | str, tasks: Mapping[str, Task], *, device: str = "auto", tls: TlsFiles | None = None
+) -> Iterator[tuple[str, Any]]:
+    """Name and result of each task, in the order in which they are complete.
+
+    `cluster` is a number of local workers, an address or a scheduler file; `device` is the workers'. Lost
+    workers are counted in a warning at the end.
+
+    Raises CagefieldError of a task with its name, without a reply, and where several workers were lost with
+    one task.
+    """
+    with connect(cluster, tls) as client, warned_losses(client, "took their tasks"):
+        futures = {
+            client.submit(_outcome, device, task, retries=RETRIES, pure=False): name
+            for name, task in tasks.items()
+        }
+        for name, (result, error) in results_of(client, futures):
+            if error:
+                raise CagefieldError(f"{name}: {error}")
+            yield name, result
+
+
+def results_of(client: Client, futures: dict[Future, str], kind: str = "") -> Iterator[tuple[str, Any]]:
+    """Name and result of each future, in the order in which they are complete; `futures` is emptied.
+
+    Those that are not done are cancelled when the iteration ends early. Messages begin with `kind` and the
+    name. Raises CagefieldError for lost workers and a lost connection.
+    """
+    from distributed import CancelledError, KilledWorker, as_completed
+
+    names = {future.key: name for future, name in futures.items()}
+    waiting = set(futures)
+    futures.clear()  # a result is released once it is here
+    try:
+        for future in as_completed(list(waiting), loop=client.loop):
+            name = names[future.key]
+            try:
+                result = future.result()
+            except KilledWorker as error:
+                raise CagefieldError(
+                    f"{kind}{name}: {int(getattr(error, 'allowed_failures', 3)) + 1} workers ended while "
+                    "they worked on it, for want of memory perhaps; use fewer workers, and --keep or --resume"
+                ) from None
+            except CancelledError:
+                raise CagefieldError(
+                    "the connection to the cluster is lost; go on with --keep or --resume"
+                ) from None
+            waiting.discard(future)
+            yield name, result
+    finally:
+        if waiting:
+            client.cancel(list(waiting), force=True)
+
+
+@contextmanager
+def warned_losses(client: Client, others: str) -> Iterator[None]:
+    """Context after which a warning counts the workers that were lost in it, and says what `others` did."""
+    lost: list[str] = []
+
+    def noted(event: Any) -> None:
+        message = event[1] if isinstance(event, tuple) else event
+        if isinstance(message, dict) and message.get("action") == "remove-worker":
+            lost.append(str(message.get("worker", "")))
+
+    client.subscribe_topic("all", noted)
+    try:
+        yield
+    finally:
+        client.unsubscribe_topic("all")
+        if lost:
+            text = "1 worker was" if len(lost) == 1 else f"{len(lost)} workers were"
+            warnings.warn(f"{text} lost; others {others}", stacklevel=2)
+
+
+def _outcome(device: str, task: Task) -> tuple[Any, str]:
+    """(result, "") of a task in the worker's process, or (None, message of a CagefieldError)."""
+    from cagefield.compute import devices
+
+    devices.start(device)
+    try:
+        return task.function(*task.arguments), ""
+    except CagefieldError as error:
+        return None, str(error)

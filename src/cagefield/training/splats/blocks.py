@@ -1,0 +1,253 @@
+"""Blocks of a capture: a partition of space by its sparse points, and the photos that see each block.
+
+Space is divided by planes across the world's axes, each at a quantile of the points on both its sides: the
+core cells of the blocks. A core is half-open, [low, high) along each axis, and the outer ones reach to
+infinity, so that every position is in exactly one core; a position outside the points' box is in the core
+that is nearest to it. A block's region is its core, grown by `OVERLAP` of its extent among the points at
+each inner plane. Its photos see enough points of the region; neighbors share the photos of the overlap.
+
+Each block is trained by itself (`train_blocks`). The merged field takes of each block the splats whose means
+lie in its core. Photos' exposure gains are known in each block up to a factor; the photos that blocks share
+fix the factors.
+
+Source: the division follows VastGaussian (Lin et al. 2024, section 4), with visibility from the points of
+the reconstruction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.datasets.views import Dataset, SparsePoints, View
+from cagefield.errors import CagefieldError
+from cagefield.fields.sh import scale_sh_colors
+from cagefield.fields.splat_field import SplatField
+from cagefield.typing import Array
+
+OVERLAP = 0.15
+"""Growth of a core at its inner planes, as a share of its extent among the points."""
+MIN_BLOCK_POINTS = 10
+"""Minimum number of a region's points that a photo of the block sees."""
+MIN_PHOTO_SHARE = 0.25
+"""Minimum share of the points that a photo sees which are the region's."""
+MAX_BLOCKS = 10_000
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A core cell with its photos and points.
+
+    Attributes:
+        core: [2,3] half-open cell, world units; infinite on the outside.
+        region: [2,3] the core grown at its inner planes.
+        photos: numbers of the training photos, ascending.
+        points: rows of the points that two of its photos see, ascending.
+        core_points, region_points: numbers of points in the core and in the region.
+    """
+
+    core: Array
+    region: Array
+    photos: tuple[int, ...]
+    points: NDArray[np.int64]
+    core_points: int
+    region_points: int
+
+    def contains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """Mask [N] of positions [N,3] in the core."""
+        return inside_cell(self.core, positions)
+
+    def describe(self) -> str:
+        """Photos and points."""
+        more = self.region_points - self.core_points
+        return f"{len(self.photos)} photos, {self.core_points} points and {more} around them"
+
+
+def divide(dataset: Dataset, points: SparsePoints, count: int) -> tuple[Block, ...]:
+    """`count` blocks of a capture's training photos; one block holds all photos and points.
+
+    Raises:
+        CagefieldError: a number of blocks that is out of range, blocks that no photo sees.
+    """
+    if not 1 <= count <= MAX_BLOCKS:
+        raise CagefieldError(f"blocks is {count}; give a number from 1 to {MAX_BLOCKS}")
+    everything = np.array([[-np.inf] * 3, [np.inf] * 3])
+    if count == 1:
+        photos, rows = tuple(range(len(dataset.train))), np.arange(len(points))
+        return (Block(everything, everything, photos, rows, len(points), len(points)),)
+    if len(points) < count * MIN_BLOCK_POINTS:
+        raise CagefieldError(
+            f"{dataset.path}: {len(points)} points are too few for {count} blocks; give --blocks "
+            f"{max(1, len(points) // MIN_BLOCK_POINTS)} or less"
+        )
+    seen = visible_points(dataset.train, points)
+    totals = np.asarray(seen.sum(axis=1)).ravel()
+    cores = partition(points.positions, count)
+    regions = [grown(core, points.positions) for core in cores]
+    members = np.stack([inside_cell(region, points.positions) for region in regions])
+    counts = np.stack([seen @ rows.astype(np.int32) for rows in members])
+    chosen = (counts >= MIN_BLOCK_POINTS) & (counts >= MIN_PHOTO_SHARE * totals)
+    most = counts.argmax(axis=0)
+    chosen[most, np.arange(len(totals))] |= counts.max(axis=0) >= MIN_BLOCK_POINTS
+    blocks = []
+    for number, (core, region, rows) in enumerate(zip(cores, regions, members, strict=True)):
+        photos = tuple(int(n) for n in np.flatnonzero(chosen[number]))
+        if len(photos) < 2:
+            raise CagefieldError(
+                f"{dataset.path}: block {number + 1} of {count} is seen by {len(photos)} photos; give fewer "
+                "--blocks"
+            )
+        shared = np.flatnonzero(np.asarray(seen[list(photos)].sum(axis=0)).ravel() >= 2)
+        inside = int(inside_cell(core, points.positions).sum())
+        blocks.append(Block(core, region, photos, shared, inside, int(rows.sum())))
+    return tuple(blocks)
+
+
+def partition(positions: Array, count: int) -> list[Array]:
+    """Half-open cells [2,3] that tile space, with about equal numbers of the points [M,3] in each.
+
+    A cell is divided across the axis along which its points spread most, 5th to 95th percentile.
+    """
+    whole = np.array([[-np.inf] * 3, [np.inf] * 3])
+    return _divided(whole, np.asarray(positions, np.float64), count)
+
+
+def _divided(cell: Array, positions: Array, count: int) -> list[Array]:
+    if count == 1:
+        return [cell]
+    low, high = np.quantile(positions, (0.05, 0.95), axis=0)
+    axis = int(np.argmax(high - low))
+    fewer = count // 2
+    rank = round(len(positions) * fewer / count)
+    around = np.sort(positions[:, axis])[max(rank - 1, 0) : rank + 1]
+    plane = float(around.mean())
+    left, right = cell.copy(), cell.copy()
+    left[1, axis] = right[0, axis] = plane
+    below = positions[:, axis] < plane
+    return _divided(left, positions[below], fewer) + _divided(right, positions[~below], count - fewer)
+
+
+def inside_cell(cell: Array, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Mask [N] of positions [N,3] in a half-open cell [2,3]."""
+    mask: NDArray[np.bool_] = ((positions >= cell[0]) & (positions < cell[1])).all(axis=1)
+    return mask
+
+
+def grown(cell: Array, positions: Array) -> Array:
+    """Cell [2,3] whose inner planes are moved outwards by OVERLAP of its extent among the points [M,3]."""
+    inside = positions[inside_cell(cell, positions)]
+    bounds = np.stack([inside.min(axis=0), inside.max(axis=0)])
+    extent = np.where(np.isfinite(cell), cell, bounds)
+    margin = OVERLAP * (extent[1] - extent[0])
+    return cell + np.stack([-margin, margin])
+
+
+def visible_points(views: Sequence[View], points: SparsePoints) -> Any:
+    """Sparse matrix int32 [V,M], 1 where a photo sees a point: as the reconstruction knows it, else by the
+    frustum.
+    """
+    from scipy.sparse import csr_matrix
+
+    if points.seen_by:
+        numbers = {view.name: n for n, view in enumerate(views)}
+        photos = np.fromiter((numbers.get(name, -1) for names in points.seen_by for name in names), np.int64)
+        rows = np.repeat(np.arange(len(points)), [len(names) for names in points.seen_by])
+        photos, rows = photos[photos >= 0], rows[photos >= 0]
+    else:
+        found = [np.flatnonzero(_in_frustum(view, points.positions)) for view in views]
+        photos = np.repeat(np.arange(len(views)), [len(part) for part in found])
+        rows = np.concatenate(found)
+    return csr_matrix((np.ones(len(rows), np.int32), (photos, rows)), shape=(len(views), len(points)))
+
+
+def _in_frustum(view: View, positions: Array) -> NDArray[np.bool_]:
+    pixels, depth = view.camera.project(positions)
+    with np.errstate(invalid="ignore"):
+        inside: NDArray[np.bool_] = (
+            (pixels >= 0).all(axis=1)
+            & (pixels < (view.camera.width, view.camera.height)).all(axis=1)
+            & (depth > 0)
+        )
+    return inside
+
+
+def block_dataset(dataset: Dataset, points: SparsePoints, block: Block) -> Dataset:
+    """The capture of a block: its training photos, and the points that two of them see; no test photos."""
+    if len(block.photos) == len(dataset.train):
+        return replace(dataset, points=points)
+    train = tuple(dataset.train[n] for n in block.photos)
+    return replace(dataset, train=train, test=(), val=(), points=points.take(block.points))
+
+
+def left_out(dataset: Dataset, blocks: Sequence[Block]) -> tuple[str, ...]:
+    """Names of the training photos in no block."""
+    used = {n for block in blocks for n in block.photos}
+    return tuple(view.name for n, view in enumerate(dataset.train) if n not in used)
+
+
+def align_gains(
+    blocks: Sequence[Block], gains: Sequence[NDArray[np.float32]], photos: int
+) -> tuple[Array, NDArray[np.float32]]:
+    """(factor [B,3] of each block's colors, gain [photos,3] of each photo in the merged field).
+
+    Block b explains a shared photo p by gains g_bp that differ between blocks by the factors f_b alone:
+    log f minimizes the sum over blocks and photos of |log g_bp - log f_b - mean_c (log g_cp - log f_c)|^2.
+    The mean gain of all photos is 1; photos in no block have gain 1.
+    """
+    design, target = [], []
+    by_photo: dict[int, list[tuple[int, Array]]] = {}
+    for number, (block, values) in enumerate(zip(blocks, gains, strict=True)):
+        for photo, gain in zip(block.photos, np.log(values.astype(np.float64)), strict=True):
+            by_photo.setdefault(photo, []).append((number, gain))
+    for known in by_photo.values():
+        mean = np.mean([gain for _, gain in known], axis=0)
+        share = np.zeros(len(blocks))
+        for number, _ in known:
+            share[number] += 1.0 / len(known)
+        for number, gain in known:
+            row = -share
+            row[number] += 1.0
+            design.append(row)
+            target.append(gain - mean)
+    # Blocks without a common photo are related by no equation: the least norm keeps their factors.
+    factors = np.linalg.lstsq(np.array(design), np.array(target), rcond=1e-9)[0]
+    merged = np.ones((photos, 3))
+    for photo, known in by_photo.items():
+        merged[photo] = np.exp(np.mean([gain - factors[number] for number, gain in known], axis=0))
+    used = list(by_photo)
+    mean_gain = merged[used].mean(axis=0)
+    merged[used] /= mean_gain
+    return np.exp(factors) * mean_gain, merged.astype(np.float32)
+
+
+def merge(blocks: Sequence[Block], fields: Sequence[SplatField], factors: Array | None = None) -> SplatField:
+    """The field of all blocks: of each block's field the splats whose means lie in its core.
+
+    Colors are multiplied by the blocks' `factors` [B,3]. The fields agree in everything but their splats.
+
+    Raises:
+        CagefieldError: no splat lies in its block's core.
+    """
+    kept = []
+    for number, (block, field) in enumerate(zip(blocks, fields, strict=True)):
+        part = field if len(blocks) == 1 else field.take(block.contains(field.means))
+        if factors is not None and not (factors[number] == 1.0).all():
+            gains = np.broadcast_to(factors[number], (len(part), 3))
+            part = replace(part, sh=scale_sh_colors(part.sh, gains))
+        kept.append(part)
+    if len(kept) == 1:
+        return kept[0]
+    if not any(len(part) for part in kept):
+        raise CagefieldError("the blocks have no splats in their cores; give fewer --blocks")
+    return replace(
+        fields[0],
+        means=np.concatenate([part.means for part in kept]),
+        log_scales=np.concatenate([part.log_scales for part in kept]),
+        quaternions=np.concatenate([part.quaternions for part in kept]),
+        opacities=np.concatenate([part.opacities for part in kept]),
+        sh=np.concatenate([part.sh for part in kept]),
+    )
