@@ -16,11 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from cagefield.cameras.camera import Camera, turntable
+from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Keyframe, stills
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
-from cagefield.exporting import FOV_X
 from cagefield.files.atomic import recover_folder, replaced_folder
 from cagefield.pages.page_edits import encode_page_edits, for_pages
 from cagefield.pages.page_field import encode_page_field
@@ -33,6 +32,7 @@ from cagefield.rendering.splats.raster_splats import changed_splats
 from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.splats.splitting import split_of
 from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
+from cagefield.scene.hotspots import resolved_view
 from cagefield.scene.scene import Scene
 
 _HERE = files("cagefield.pages")
@@ -94,13 +94,18 @@ class ScenePage:
             along = path_edits(plain, scene.edits, keys, loop, scene.patcher, on_progress=on_progress)
         if along is not None:
             found["path"] = along.data
-        header = {
-            "start": _view(_start(scene)),
+        header: dict[str, Any] = {
+            "start": _view(scene.first_camera),
             "up": scene.up.tolist(),
             "centre": scene.field.center.tolist(),
             "background": None if scene.background is None else list(scene.background),
             "path": _path(keys, loop),
+            "extent": 2.0 * float(np.linalg.norm(scene.field.half_size)),
         }
+        if scene.hotspots:
+            header["hotspots"] = _hotspots(scene)
+        if scene.alignment.meters_per_unit is not None:
+            header["meters_per_unit"] = scene.alignment.meters_per_unit
         return cls(title, header, found, along)
 
     def one_file(self) -> str:
@@ -201,22 +206,25 @@ def _script(name: str, data: bytes | None) -> str:
     return f'<script>cagefieldViewer.take("{name}",{text})</script>'
 
 
-def _start(scene: Scene) -> Camera:
-    """The first test camera, or any, or one in front of a scene without cameras."""
-    for split in ("test", "val", "train"):
-        if scene.cameras.get(split):
-            return scene.cameras[split][0]
-    bounds = scene.field.bounds
-    radius = 0.6 * float(np.linalg.norm(bounds[1] - bounds[0])) / math.sin(0.5 * FOV_X)
-    return turntable(
-        bounds.mean(axis=0), radius, 1, elevation=0.3, up=scene.up, width=400, height=400, fov_x=FOV_X
-    )[0]
-
-
 def _view(camera: Camera) -> dict[str, Any]:
     """A camera's pose, and the field of view of its shorter side, which the window's shorter side has."""
     least = min(camera.width / camera.fx, camera.height / camera.fy)
     return {"c2w": camera.c2w.ravel().tolist(), "fov_y_deg": math.degrees(2.0 * math.atan(0.5 * least))}
+
+
+def _hotspots(scene: Scene) -> list[dict[str, Any]]:
+    """Texts, positions and views of the scene's hotspots."""
+    first, up = scene.first_camera, scene.up
+    views = [resolved_view(hotspot, first, up) for hotspot in scene.hotspots]
+    return [
+        {
+            "title": hotspot.title,
+            "text": hotspot.text,
+            "position": list(hotspot.position),
+            "view": {"c2w": list(view.c2w), "fov_y_deg": view.fov_y_deg},
+        }
+        for hotspot, view in zip(scene.hotspots, views, strict=True)
+    ]
 
 
 def _path(keys: tuple[Keyframe, ...], loop: bool) -> dict[str, Any] | None:

@@ -4,9 +4,13 @@
  */
 import { AdaptiveResolution, waitForGpu } from "../field/adaptive_resolution";
 import type { SceneDrawer } from "../field/scene_drawer";
+import type { Distances } from "../field/views";
 import { createDrawer, identifyScene, readMagic } from "../splats/drawer_selection";
 import { viewAt } from "./camera_path";
 import type { Path, View } from "./camera_path";
+import { poseBetween } from "./flight";
+import type { Pose } from "./flight";
+import type { Hotspot } from "./hotspots";
 import { Orbit } from "./orbit";
 import { PathEdits } from "./path_edits";
 import { openFile, readAll } from "./sources";
@@ -22,6 +26,12 @@ export interface SceneHeader {
   centre: Vec3;
   background: Vec3 | null;
   path: Path | null;
+  /** Points with text; absent without any. */
+  hotspots?: Hotspot[];
+  /** Scale of the scene; absent where it is unknown. */
+  meters_per_unit?: number;
+  /** Diagonal of the scene's box, world units. */
+  extent: number;
   /** `edits`: those of the scene. `path`: the edits along the camera path. */
   files: { field: FileEntry; edits?: FileEntry; path?: FileEntry };
 }
@@ -30,6 +40,10 @@ export interface SceneHeader {
 const SETTLE_MS = 120;
 const MAX_DEVICE_PIXEL_RATIO = 2;
 const MIN_FRAME_PIXELS = 8;
+
+/** Number of distances that are read back from an image with hotspots. */
+const DISTANCES = 10_000;
+const FLIGHT_MS = 2500;
 
 export class SceneViewer {
   /** The renderer of the scene's kind; null before the first bytes of the scene. */
@@ -46,6 +60,11 @@ export class SceneViewer {
   /** Number of frames shown. */
   pictures = 0;
   private playStart: number | null = null;
+  private flight: { from: Pose; to: Pose; begun: number; view: View; around: Vec3 } | null = null;
+  /** Distances of the last image, read where there are hotspots; null before it. */
+  distances: Distances | null = null;
+  /** Called before each of the browser's frames in which the view or the image may be another one. */
+  onFrame: (() => void) | null = null;
   /** The scene's edits; undefined while they are being loaded. */
   private edits: unknown = undefined;
   private showsEdits = true;
@@ -54,7 +73,7 @@ export class SceneViewer {
   canPlay = false;
 
   constructor(
-    private readonly canvas: HTMLCanvasElement,
+    readonly canvas: HTMLCanvasElement,
     private readonly header: SceneHeader,
     private readonly say: (text: string) => void,
     private readonly progressed: (share: number) => void = () => undefined,
@@ -138,15 +157,47 @@ export class SceneViewer {
     return this.playStart !== null;
   }
 
+  /** Diagonal of the scene's box, world units. */
+  get extent(): number {
+    return this.header.extent;
+  }
+
+  /** Focal length in CSS pixels. */
+  get focal(): number {
+    return (0.5 * Math.min(this.canvas.clientWidth, this.canvas.clientHeight)) / this.halfTangent;
+  }
+
+  /** Whether the view flies to a hotspot. */
+  get flies(): boolean {
+    return this.flight !== null;
+  }
+
+  /** Flies to a view; then the orbit's center is the point of its axis closest to `around`. */
+  flyTo(view: View, around: Vec3): void {
+    this.playStart = null;
+    if (this.edits !== undefined) this.renderer?.setEdits(this.edits);
+    const end = new Orbit(view.c2w, this.header.up, around);
+    const { eye, target } = this.orbit;
+    this.flight = {
+      from: { eye, target, fov_y_deg: this.fov },
+      to: { eye: end.eye, target: end.target, fov_y_deg: view.fov_y_deg },
+      begun: matchMedia("(prefers-reduced-motion: reduce)").matches ? -Infinity : performance.now(),
+      view,
+      around,
+    };
+    this.invalidate();
+  }
+
   /** Plays the camera path from its start, or stops. */
   play(on: boolean): void {
     this.playStart = on && this.canPlay ? performance.now() : null;
+    this.flight = null;
     this.invalidate();
   }
 
   /** Shows the view in which the scene opens, with its complete edits. */
   home(): void {
-    this.playStart = null;
+    this.playStart = this.flight = null;
     if (this.edits !== undefined) this.renderer?.setEdits(this.edits);
     this.look(this.header.start);
   }
@@ -162,14 +213,14 @@ export class SceneViewer {
     return Math.tan((this.fov * Math.PI) / 360);
   }
 
-  private look(view: View): void {
-    this.orbit = new Orbit(view.c2w, this.header.up, this.header.centre);
+  private look(view: View, around = this.header.centre): void {
+    this.orbit = new Orbit(view.c2w, this.header.up, around);
     this.fov = view.fov_y_deg;
     this.invalidate();
   }
 
   private change(action: () => void): void {
-    this.playStart = null;
+    this.playStart = this.flight = null;
     action();
     this.invalidate();
   }
@@ -185,6 +236,7 @@ export class SceneViewer {
       await new Promise((done) => requestAnimationFrame(done));
       try {
         this.advance();
+        this.onFrame?.();
         if (this.renderer !== null) await this.draw(this.renderer);
       } catch (error) {
         this.say(error instanceof Error ? error.message : String(error));
@@ -195,11 +247,26 @@ export class SceneViewer {
 
   /** Moves on along the camera path while it plays. */
   private advance(): void {
+    if (this.flight !== null) this.advanceFlight(this.flight);
     const { path } = this.header;
     if (this.playStart === null || !path) return;
     const time = (performance.now() - this.playStart) / 1000;
     this.seek(path, time);
     if (!path.loop && time >= path.seconds) this.playStart = null;
+  }
+
+  private advanceFlight({ from, to, begun, view, around }: NonNullable<SceneViewer["flight"]>): void {
+    const share = (performance.now() - begun) / FLIGHT_MS;
+    if (share >= 1) {
+      this.flight = null;
+      this.look(view, around);
+      return;
+    }
+    const { eye, target, fov_y_deg } = poseBetween(from, to, share, this.header.up);
+    this.orbit.eye = eye;
+    this.orbit.target = target;
+    this.fov = fov_y_deg;
+    this.invalidate();
   }
 
   /** Draws a moving frame after a change, and bands of the complete frame once the view is still. */
@@ -227,6 +294,7 @@ export class SceneViewer {
     const isComplete = first + count >= down;
     if (isComplete) {
       renderer.show(width, height);
+      if (this.header.hotspots) this.distances = renderer.distances(DISTANCES);
       this.pictures++;
     }
     resolution.record(across * count, await waitForGpu(gl));

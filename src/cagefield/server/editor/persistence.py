@@ -26,6 +26,7 @@ from cagefield.files.safe_open import FileState, read_bytes, read_text, real_pat
 from cagefield.files.stale_files import remove_leftovers, remove_unfinished
 from cagefield.files.temporary_folders import remove_abandoned
 from cagefield.scene.alignment import Alignment
+from cagefield.scene.hotspots import hotspots_from_value
 from cagefield.scene.removed_elements import Removal, dump_removed, read_removed
 from cagefield.scene.scene import Scene
 from cagefield.scene.scene_files import FIELD, REMOVED, field_states
@@ -99,6 +100,7 @@ class SceneStore:
             loop=loop,
             removed=read_removed(self.path if self.source is None else self.origin),
             meters_per_unit=self.scene.alignment.meters_per_unit,
+            hotspots=self.scene.hotspots,
         )
 
     def recovered(self) -> Document | None:
@@ -317,6 +319,7 @@ class SceneStore:
             folder=folder,
             removal=removal,
             alignment=dataclasses.replace(self.scene.alignment, meters_per_unit=document.meters_per_unit),
+            hotspots=tuple(entry.hotspot for entry in document.hotspots),
         )
 
     def _fingerprint(self) -> str:
@@ -338,6 +341,7 @@ def _content(document: Document, edits: list[object]) -> dict[str, object]:
         "locked": [entry.locked for entry in document.entries],
         "preserve_opacity": document.preserve_opacity,
         "meters_per_unit": document.meters_per_unit,
+        "hotspots": [entry.hotspot.to_dict() for entry in document.hotspots],
         "loop": document.loop,
         "removed": None if document.removed is None else dump_selection(document.removed),
         "keys": [
@@ -376,6 +380,7 @@ def _parsed(content: dict[str, object]) -> Document:
         loop=bool(content["loop"]),
         removed=None if removed is None else parse_selection(removed),
         meters_per_unit=Alignment(content.get("meters_per_unit")).meters_per_unit,  # type: ignore[arg-type]
+        hotspots=hotspots_from_value(content.get("hotspots", [])),
     )
     locked = content["locked"]
     entries = tuple(

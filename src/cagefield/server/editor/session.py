@@ -21,8 +21,10 @@ from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
 from cagefield.geometry.detour_grid import DetourGrid
 from cagefield.geometry.mesh_cage import MeshCage
+from cagefield.scene.hotspots import Hotspot
 from cagefield.selection.element_selection import Mode, Selection
 from cagefield.selection.selection_cages import outer_cage_of_shape
+from cagefield.server.editor import hotspot_list
 from cagefield.server.editor.active_drags import Drags
 from cagefield.server.editor.cage_placement import cage_pair_around, outer_cage_around
 from cagefield.server.editor.chain_edits import (
@@ -82,6 +84,7 @@ class Session:
         self.revision = 1
         self._saved: Document | None = document
         self._next = max((entry.id for entry in document.entries), default=0) + 1
+        self._next_hotspot = hotspot_list.next_number(document.hotspots)
         self._problems: IdentityCache[Edit, str | None] = IdentityCache(4 * MAX_EDITS)
         self._connected = ConnectedEdits()
         self._carriers = Carriers(self.problem, self._connected.resolved)
@@ -418,6 +421,30 @@ class Session:
         if meters_per_unit != self.document.meters_per_unit:
             self._push("Scale in meters", replace(self.document, meters_per_unit=meters_per_unit))
 
+    def put_hotspot(self, number: int | None, hotspot: Hotspot) -> int:
+        """The number of a hotspot: a new one for None, else the one of that number, changed."""
+        entries = self.document.hotspots
+        if number is None:
+            number = self._next_hotspot
+            self._next_hotspot += 1
+            label, entries = "Place hotspot", hotspot_list.added(entries, number, hotspot)
+        else:
+            label, entries = "Change hotspot", hotspot_list.changed(entries, number, hotspot)
+        self._push_hotspots(f'{label} "{hotspot.title:.60}"', entries)
+        return number
+
+    def remove_hotspot(self, number: int) -> None:
+        """A hotspot goes."""
+        self._push_hotspots("Remove hotspot", hotspot_list.removed(self.document.hotspots, number))
+
+    def move_hotspot(self, number: int, to: int) -> None:
+        """A hotspot goes to another place in the list, 0 first."""
+        self._push_hotspots("Reorder hotspots", hotspot_list.moved(self.document.hotspots, number, to))
+
+    def _push_hotspots(self, label: str, entries: hotspot_list.HotspotList) -> None:
+        if entries != self.document.hotspots:
+            self._push(label, replace(self.document, hotspots=entries))
+
     def select(self, number: int | None) -> None:
         """Select an edit on all pages; no entry of the history."""
         if number is not None:
@@ -500,6 +527,7 @@ class Session:
     def restore(self, document: Document) -> None:
         """Changes that were not saved before a crash, as one entry."""
         self._next = max([self._next, *(entry.id + 1 for entry in document.entries)])
+        self._next_hotspot = max(self._next_hotspot, hotspot_list.next_number(document.hotspots))
         self._push("Restore unsaved changes", document)
         self.selected = document.entries[-1].id if document.entries else None
 
