@@ -243,3 +243,44 @@ def test_a_full_list_takes_no_more(tmp_path: Path) -> None:
     _, session = opened(tmp_path / "scene")
     with pytest.raises(EditError, match="at most 200 hotspots"):
         say(session, type="put_hotspot", title="one more", position=[0, 0, 0])
+
+
+def test_a_save_keeps_what_another_program_wrote_meanwhile(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "scene"
+    ball_scene().save(folder)
+    store, session = opened(folder)
+    printed(capsys, "align", str(folder), "--meters-per-unit", "2.5", "--up", "0,0.1,1")
+    printed(capsys, "hotspot", str(folder), "--add", "late", "--at", "0", "0", "0")
+    session.preserve_opacity(False)
+    store.save(session)
+    scene = Scene.open(folder)
+    assert scene.alignment.meters_per_unit == 2.5 and scene.alignment.up is not None
+    assert [h.title for h in scene.hotspots] == ["late"] and not scene.preserve_opacity
+    # The session has them now: the next save writes them again, and undo takes them back.
+    assert session.document.meters_per_unit == 2.5 and session.saved
+    store.save(session)
+    assert Scene.open(folder).alignment.meters_per_unit == 2.5
+    session.undo()
+    assert session.document.meters_per_unit is None and session.document.hotspots == ()
+
+
+def test_a_value_that_both_changed_is_replaced_at_the_second_save(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "scene"
+    ball_scene().save(folder)
+    store, session = opened(folder)
+    session.set_scale(7.0)
+    printed(capsys, "align", str(folder), "--meters-per-unit", "2.5", "--up", "0,0.1,1")
+    with pytest.raises(
+        SceneError, match=r"scene\.json was changed by another program, and so were the scale"
+    ):
+        store.save(session)
+    assert Scene.open(folder).alignment.meters_per_unit == 2.5
+    store.save(session)
+    scene = Scene.open(folder)
+    assert scene.alignment.meters_per_unit == 7.0
+    np.testing.assert_allclose(scene.alignment.up, np.array([0.0, 0.1, 1.0]) / np.sqrt(1.01), atol=1e-12)
+    store.save(session)  # no notice without another change

@@ -87,7 +87,7 @@ class HotspotCommand:
 
     def _changed(self, scene: Scene) -> tuple[Hotspot, ...]:
         """The hotspots after the changes that the options ask for."""
-        from cagefield.scene.hotspots import Hotspot, find_hotspot
+        from cagefield.scene.hotspots import Hotspot, find_hotspot, hotspots_from_file
 
         hotspots = scene.hotspots
         if self.add is not None and self.at is not None:
@@ -111,7 +111,7 @@ class HotspotCommand:
             if sorted(indices) != list(range(len(hotspots))):
                 raise CagefieldError(f"--order must name each of the {len(hotspots)} hotspots once")
             return tuple(hotspots[index] for index in indices)
-        return hotspots if self.load is None else self._loaded(self.load)
+        return hotspots if self.load is None else hotspots_from_file(self.load)
 
     def _view(self, scene: Scene) -> HotspotView | None:
         from cagefield.scene.hotspots import view_of_camera
@@ -124,25 +124,6 @@ class HotspotCommand:
             known = ", ".join(f"{name} 0 to {len(c) - 1}" for name, c in scene.cameras.items() if c) or "none"
             raise CagefieldError(f"--camera {split} {index} is no camera of the scene, which has {known}")
         return view_of_camera(cameras[index])
-
-    def _loaded(self, path: Path) -> tuple[Hotspot, ...]:
-        from cagefield.files import yaml_text
-        from cagefield.files.safe_open import read_text
-        from cagefield.scene.hotspots import hotspots_from_value
-
-        try:
-            document = yaml_text.loads(read_text(path))
-        except yaml_text.YamlError as error:
-            line = f", line {error.line}" if error.line else ""
-            raise CagefieldError(f"{path}{line}: {error}") from None
-        except ValueError as error:
-            raise CagefieldError(f"{path}: {error}") from None
-        if not isinstance(document, dict) or set(document) != {"hotspots"}:
-            raise CagefieldError(f"{path} must hold a list with the key hotspots, and nothing else")
-        try:
-            return hotspots_from_value(document["hotspots"])
-        except CagefieldError as error:
-            raise CagefieldError(f"{path}: {error}") from None
 
     def _write(self, hotspots: tuple[Hotspot, ...], path: Path) -> None:
         import yaml

@@ -10,6 +10,7 @@ import math
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from numpy.typing import ArrayLike
 from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Keyframe
 from cagefield.errors import CagefieldError, CameraError, SceneError
+from cagefield.files import yaml_text
+from cagefield.files.safe_open import read_text
 
 MAX_HOTSPOTS = 200
 """Maximum number of hotspots of a scene."""
@@ -107,6 +110,23 @@ def hotspots_from_value(value: Any) -> tuple[Hotspot, ...]:
         except SceneError as error:
             raise SceneError(f"hotspot {number}: {error}") from None
     return tuple(hotspots)
+
+
+def hotspots_from_file(path: Path) -> tuple[Hotspot, ...]:
+    """Hotspots of a YAML or JSON file with a list `hotspots`. Raises SceneError that names file and cure."""
+    try:
+        document = yaml_text.loads(read_text(path))
+    except yaml_text.YamlError as error:
+        line = f", line {error.line}" if error.line else ""
+        raise SceneError(f"{path}{line}: {error}") from None
+    except ValueError as error:
+        raise SceneError(f"{path}: {error}") from None
+    if not isinstance(document, dict) or set(document) != {"hotspots"}:
+        raise SceneError(f"{path} must hold a list with the key hotspots, and nothing else")
+    try:
+        return hotspots_from_value(document["hotspots"])
+    except SceneError as error:
+        raise SceneError(f"{path}: {error}") from None
 
 
 def check_count(count: int) -> None:

@@ -20,9 +20,9 @@ class HotspotEntry:
 HotspotList = tuple[HotspotEntry, ...]
 
 
-def numbered(hotspots: Iterable[Hotspot]) -> HotspotList:
-    """Entries of a scene's hotspots, numbered from 1."""
-    return tuple(HotspotEntry(number, hotspot) for number, hotspot in enumerate(hotspots, start=1))
+def numbered(hotspots: Iterable[Hotspot], first: int = 1) -> HotspotList:
+    """Entries of a scene's hotspots, numbered from `first`."""
+    return tuple(HotspotEntry(number, hotspot) for number, hotspot in enumerate(hotspots, start=first))
 
 
 def next_number(entries: HotspotList) -> int:

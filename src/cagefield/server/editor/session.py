@@ -43,6 +43,7 @@ from cagefield.server.editor.edit_texts import ReadEdits, edits_in
 from cagefield.server.editor.history import History
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.editor.labels import edit_label, fresh_name, option_word, suffix_for
+from cagefield.server.editor.manifest_merge import ManifestValues, merged
 from cagefield.server.editor.mirror import mirror_edit
 from cagefield.server.editor.pasting import crop_paste
 from cagefield.server.editor.path_edits import edits_at_time
@@ -523,6 +524,17 @@ class Session:
         document = replace(self.document, keys=keys, loop=loop)
         if document != self.document:
             self._push("Camera path", document)
+
+    def take_manifest(self, before: ManifestValues, disk: ManifestValues) -> list[str]:
+        """Values of the manifest that another program alone changed, as one entry; words for conflicts.
+
+        `before` are the values that both began with, `disk` those of the file.
+        """
+        document, conflicts = merged(self.document, before, disk, self._next_hotspot)
+        if document != self.document:
+            self._next_hotspot = hotspot_list.next_number(document.hotspots)
+            self._push("Changed by another program", document)
+        return conflicts
 
     def restore(self, document: Document) -> None:
         """Changes that were not saved before a crash, as one entry."""
