@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import hashlib
 import html
 import json
@@ -20,10 +21,12 @@ from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Keyframe, stills
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
+from cagefield.exporting import edited_splats
 from cagefield.files.atomic import recover_folder, replaced_folder
 from cagefield.pages.page_edits import encode_page_edits, for_pages
 from cagefield.pages.page_field import encode_page_field
 from cagefield.pages.page_file import bytes_until
+from cagefield.pages.page_nodes import NODE_NAME, encode_page_nodes
 from cagefield.pages.page_splat_edits import encode_page_splat_edits
 from cagefield.pages.page_splats import encode_page_splats
 from cagefield.pages.path_states import PathEdits, path_edits
@@ -62,6 +65,8 @@ class ScenePage:
     header: Mapping[str, Any]
     files: Mapping[str, bytes]
     along: PathEdits | None
+    nodes: Mapping[str, bytes] = dataclasses.field(default_factory=dict)
+    """Files of levels of detail by name (`page_nodes`), in the folder form alone."""
 
     @classmethod
     def build(
@@ -72,19 +77,32 @@ class ScenePage:
         *,
         loop: bool = False,
         step: float = 0.5,
+        levels: bool = False,
         on_progress: Callable[[float], None] = lambda done: None,
     ) -> ScenePage:
         """The page of an edited scene, with the camera path of `keys`.
 
-        `step` is the distance between samples in voxels. `on_progress` is told how much is done of the edits
-        along the path.
+        `step` is the distance between samples in voxels. With `levels`, splats get levels of detail, for a
+        folder (`page_nodes`): edits are baked in, so that the page does not show the scene before them, and
+        stand still along the path. `on_progress` is told how much is done of the edits along the path, or of
+        the levels.
 
         Raises:
             CagefieldError: the scene holds discs (2DGS).
             EditError: edits that cannot be evaluated, or more than a page takes.
         """
+        nodes: Mapping[str, bytes] = {}
         field = scene.rendered_field
-        if isinstance(field, SplatSet):
+        if levels:
+            if not isinstance(field, SplatSet):
+                raise CagefieldError(
+                    "the scene holds voxels, whose pages have levels already; leave out --levels"
+                )
+            coarse, nodes = encode_page_nodes(
+                edited_splats(scene), background=scene.background, on_progress=on_progress
+            )
+            found, along = {"field": coarse}, None
+        elif isinstance(field, SplatSet):
             found, along = _splat_files(scene, field, keys, loop, on_progress)
         else:
             plain = VoxelRenderer(field, EditStack([]), preserve_opacity=scene.preserve_opacity)
@@ -106,7 +124,7 @@ class ScenePage:
             header["hotspots"] = _hotspots(scene)
         if scene.alignment.meters_per_unit is not None:
             header["meters_per_unit"] = scene.alignment.meters_per_unit
-        return cls(title, header, found, along)
+        return cls(title, header, found, along, nodes)
 
     def one_file(self) -> str:
         """The text of an HTML file that needs neither server nor network.
@@ -114,6 +132,8 @@ class ScenePage:
         The viewer comes first and the coarse level next, so that a browser shows it while the rest is on its
         way.
         """
+        if self.nodes:
+            raise CagefieldError("levels of detail are files beside a page; write a folder (--embed)")
         field, coarse = self.files["field"], bytes_until(self.files["field"], "1.")
         order = [("field", field[:coarse]), *((n, self.files[n]) for n in ("edits",) if n in self.files)]
         order += [("field", field[coarse:]), *((n, self.files[n]) for n in ("path",) if n in self.files)]
@@ -133,6 +153,8 @@ class ScenePage:
         for name, data in self.files.items():
             written[NAMES[name]] = data
             entries[name] = {"bytes": len(data), "url": _address(NAMES[name], data)}
+        written.update(self.nodes)
+        entries["field"]["bytes"] += sum(map(len, self.nodes.values()))
         script = f'<script src="{_address(SCRIPT, written[SCRIPT])}"></script>'
         written[INDEX] = self._html(FOLDER, entries, script).encode()
         return written
@@ -155,7 +177,9 @@ def write_folder(folder: Path, written: Mapping[str, bytes]) -> None:
     Other files of an older folder stay.
     """
     recover_folder(folder, lambda left: (left / SCRIPT).is_file())
-    with replaced_folder(folder, [INDEX, SCRIPT, *NAMES.values()]) as draft:
+    former = [path.name for path in folder.glob(f"{NODE_NAME}.*")] if folder.is_dir() else []
+    names = {INDEX, SCRIPT, *NAMES.values(), *former, *written}
+    with replaced_folder(folder, sorted(names)) as draft:
         for name, data in written.items():
             (draft / name).write_bytes(data)
 

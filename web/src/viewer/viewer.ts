@@ -13,7 +13,7 @@ import type { Pose } from "./flight";
 import type { Hotspot } from "./hotspots";
 import { Orbit } from "./orbit";
 import { PathEdits } from "./path_edits";
-import { openFile, readAll } from "./sources";
+import { openBeside, openFile, readAll } from "./sources";
 import type { FileEntry } from "./sources";
 import { SPLAT_PATH_MAGIC, SplatPath } from "./splat_path";
 import { listenForMoves } from "./touch_controls";
@@ -57,6 +57,8 @@ export class SceneViewer {
   private nextRow: number | null = 0;
   /** Whether a moving frame of the current view has been shown: the complete frame is drawn only then. */
   private previewed = false;
+  /** Number of calls of `refresh`. */
+  private refreshes = 0;
   /** Number of frames shown. */
   pictures = 0;
   private playStart: number | null = null;
@@ -116,6 +118,9 @@ export class SceneViewer {
     renderer.edited = this.showsEdits;
     let edits: Promise<void> | undefined;
     await renderer.load(source, {
+      openBeside,
+      onDetails: () => this.refresh(),
+      onCoarse: (nodes, of) => this.say(`The GPU has no room for the details of ${nodes} of ${of} parts.`),
       onArrival: (bytes) => this.progressed(Math.min(0.99, bytes / files.field.bytes)),
       onLevel: (number, count) => {
         this.say(number < count ? "Loading detail …" : "");
@@ -231,6 +236,12 @@ export class SceneViewer {
     this.previewed = false;
   }
 
+  /** Draws the complete frame once more; the one before stays until then. */
+  private refresh(): void {
+    this.refreshes++;
+    this.nextRow = 0;
+  }
+
   private async drawFrames(): Promise<void> {
     for (;;) {
       await new Promise((done) => requestAnimationFrame(done));
@@ -288,7 +299,7 @@ export class SceneViewer {
     const first = isStill ? this.nextRow : 0;
     const isBand = isStill && renderer.inBands;
     const count = isBand ? Math.min(resolution.bandRows(width, height), height - first) : down;
-    const { changedAt } = this;
+    const { changedAt, refreshes } = this;
     const sorted = performance.now() - changedAt > SETTLE_MS;
     if (!renderer.render({ rows: { first, count }, sorted })) return;
     const isComplete = first + count >= down;
@@ -300,6 +311,7 @@ export class SceneViewer {
     resolution.record(across * count, await waitForGpu(gl));
     if (this.changedAt !== changedAt) return;
     this.previewed = true;
+    if (this.refreshes !== refreshes) return void (this.nextRow = 0);
     // Splats that were in an older depth order are drawn again.
     if (isStill) this.nextRow = !isComplete ? first + count : renderer.inOrder ? null : 0;
   }
