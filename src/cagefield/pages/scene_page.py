@@ -154,7 +154,7 @@ class ScenePage:
             written[NAMES[name]] = data
             entries[name] = {"bytes": len(data), "url": _address(NAMES[name], data)}
         written.update(self.nodes)
-        entries["field"]["bytes"] += sum(map(len, self.nodes.values()))
+        entries["field"]["bytes"] = len(self.files["field"]) + sum(map(len, self.nodes.values()))
         script = f'<script src="{_address(SCRIPT, written[SCRIPT])}"></script>'
         written[INDEX] = self._html(FOLDER, entries, script).encode()
         return written
