@@ -7,7 +7,7 @@ Splats are cut along a Morton curve into nodes of at most NODE_SPLATS. A node's 
     count   splats of the node
     coarse  [first, end) of the parent's splats in the coarse level
     bounds  [2,3], box of the means
-    url, bytes   of the node's own file of `page_splats`, with the coarse file's centre and steps
+    url, bytes   of the node's own file of `page_splats`, with the coarse file's center and steps
 
 A page draws of each node the parent or the splats themselves, never both: the parent is hidden in the image
 in which the node's splats appear. Nodes come in the order of their size in the camera's image.
@@ -75,7 +75,7 @@ def encode_page_nodes(
         raise CagefieldError(
             f"the scene has {len(field)} splats and a coarse level {coarse}; leave out --levels"
         )
-    centre, steps = field.center, coefficient_steps(field)
+    center, steps = field.center, coefficient_steps(field)
     parts = node_rows(field, node)
     share = max(MIN_PARENT_SPLATS, coarse // len(parts))
     parents, entries, files = [], [], {}
@@ -83,7 +83,7 @@ def encode_page_nodes(
     for number, rows in enumerate(parts):
         splats = _rows_of(field, rows)
         parent = decimate_splats(splats, share)
-        data = _file(splats, field, centre, steps, background, {"count": len(rows)})
+        data = _file(splats, field, center, steps, background, {"count": len(rows)})
         name = f"{NODE_NAME}.{number:04d}"
         files[name] = data
         entries.append(
@@ -100,7 +100,7 @@ def encode_page_nodes(
         on_progress((number + 1) / len(parts))
     together = _joined(parents, field)
     header = {"count": first + len(field), "nodes": entries}
-    return NodeFiles(_file(together, field, centre, steps, background, header), files)
+    return NodeFiles(_file(together, field, center, steps, background, header), files)
 
 
 def node_rows(field: SplatField, node: int) -> list[NDArray[np.int64]]:
@@ -113,15 +113,15 @@ def node_rows(field: SplatField, node: int) -> list[NDArray[np.int64]]:
 def _file(
     splats: SplatField,
     field: SplatField,
-    centre: NDArray[np.float64],
+    center: NDArray[np.float64],
     steps: NDArray[np.float64],
     background: tuple[float, float, float] | None,
     values: dict[str, Any],
 ) -> bytes:
     """File of splats with the header of `field`, but for `values`."""
     rows = np.arange(len(splats))
-    arrays = encode_level(splats, rows, splats.opacities, centre, steps, field)
-    header = splat_header(field, centre, steps, background, [len(splats)])
+    arrays = encode_level(splats, rows, splats.opacities, center, steps, field)
+    header = splat_header(field, center, steps, background, [len(splats)])
     return pack(MAGIC, VERSION, {**header, **values}, {f"0.{name}": part for name, part in arrays.items()})
 
 

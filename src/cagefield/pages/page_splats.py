@@ -121,12 +121,12 @@ def encode_level(
     field: SplatField,
     rows: NDArray[np.int64],
     opacities: AnyArray,
-    centre: AnyArray,
+    center: AnyArray,
     steps: AnyArray,
     whole: SplatField,
 ) -> dict[str, NDArray[Any]]:
     """Arrays of a level with some rows of a field; means are as exact as those of the `whole` field."""
-    chunks, means = encode_means(field.means[rows], centre, whole)
+    chunks, means = encode_means(field.means[rows], center, whole)
     return {
         "chunks": chunks,
         "means": means,
@@ -140,7 +140,7 @@ def encode_level(
 
 def splat_header(
     field: SplatField,
-    centre: AnyArray,
+    center: AnyArray,
     steps: AnyArray,
     background: tuple[float, float, float] | None,
     levels: list[int],
@@ -151,7 +151,7 @@ def splat_header(
         "degree": field.sh_degree,
         "antialiased": field.antialiased,
         "bounds": field.bounds.tolist(),
-        "centre": centre.tolist(),
+        "centre": center.tolist(),
         "near": near_depth(field.bounds),
         "background": None if background is None else list(background),
         "log_scales": list(SCALES),
