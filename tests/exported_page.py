@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -82,8 +83,17 @@ def rendered(scene: Scene, camera: Camera, edits: bool = True) -> NDArray[np.uin
 
 
 @contextmanager
-def web_server(root: Path, cuts: Mapping[str, int], go_on: threading.Event) -> Iterator[str]:
-    """A server of a folder; of files named in `cuts` only so many bytes come before `go_on` is set."""
+def web_server(
+    root: Path,
+    cuts: Mapping[str, int],
+    go_on: threading.Event,
+    own: Mapping[str, threading.Event] = MappingProxyType({}),
+    others: threading.Event | None = None,
+) -> Iterator[str]:
+    """A server of a folder; of files named in `cuts` only so many bytes come before `go_on` is set.
+
+    Files in `own` have an event of their own, and the others wait for `others` where that is given.
+    """
 
     class Handler(http.server.SimpleHTTPRequestHandler):
         def do_GET(self) -> None:
@@ -96,7 +106,7 @@ def web_server(root: Path, cuts: Mapping[str, int], go_on: threading.Event) -> I
             self.wfile.write(data[:cut])
             self.wfile.flush()
             if cut:
-                go_on.wait(120.0)
+                own.get(path.name, others or go_on).wait(120.0)
             self.wfile.write(data[cut:])
 
         def log_message(self, *words: object) -> None:
@@ -108,7 +118,9 @@ def web_server(root: Path, cuts: Mapping[str, int], go_on: threading.Event) -> I
     try:
         yield f"http://localhost:{server.server_address[1]}"
     finally:
-        go_on.set()
+        for event in (go_on, *own.values(), others):
+            if event is not None:
+                event.set()
         server.shutdown()
         server.server_close()
         thread.join()

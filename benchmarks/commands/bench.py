@@ -10,6 +10,7 @@ import tyro
 from benchmarks.commands.bench_captures import BenchCaptures
 from benchmarks.commands.bench_edits import BenchEdits
 from benchmarks.commands.bench_maps import BenchAblation, BenchGrids
+from benchmarks.commands.bench_publish import BenchPublish
 from benchmarks.commands.bench_training import BenchSpeed, BenchTraining
 
 
@@ -20,6 +21,7 @@ class Bench:
     what: tyro.conf.OmitSubcommandPrefixes[
         tyro.conf.OmitArgPrefixes[
             Annotated[BenchEdits, tyro.conf.subcommand("edits")]
+            | Annotated[BenchPublish, tyro.conf.subcommand("publish")]
             | Annotated[BenchGrids, tyro.conf.subcommand("grids")]
             | Annotated[BenchAblation, tyro.conf.subcommand("ablation")]
             | Annotated[BenchSpeed, tyro.conf.subcommand("speed")]

@@ -24,6 +24,8 @@ from .images.render_result import RenderResult as RenderResult
 from .rendering.reference_renderer import render_sampled as render_sampled
 from .rendering.splats.splat_renderer import SplatRenderer as SplatRenderer
 from .rendering.voxels.voxel_renderer import VoxelRenderer as VoxelRenderer
+from .scene.hotspots import Hotspot as Hotspot
+from .scene.hotspots import HotspotView as HotspotView
 from .scene.scene import Scene as Scene
 from .training.splats.train_splats import train_splat as train_splat
 from .training.voxels.train_voxels import train_voxel as train_voxel

@@ -9,6 +9,8 @@ from pathlib import Path
 from torch_files import write_checkpoints
 
 from cagefield import Scene
+from cagefield.cameras.keyframe_files import dump_path
+from cagefield.cameras.keyframes import Keyframe
 from cagefield.formats.splats.splat_files import write_splats
 from cagefield.procedural import make_scene
 from posed_photos import photos_alone
@@ -31,6 +33,9 @@ def sources(folder: Path) -> None:
     ball_scene().save(folder / "voxels")
     Scene(ball_of_splats(4000), cameras=ball_scene().cameras).save(folder / "splats")
     write_splats(ball_of_splats(4000), folder / "x.ply")
+    views = ball_scene().cameras["test"]
+    keys = [Keyframe(tuple(camera.c2w.ravel()), 40.0, 1.0) for camera in (views[0], views[0])]
+    (folder / "path.json").write_text(dump_path(keys, loop=False))
     make_scene("chair", folder / "photos", views=4, size=16, test_views=1)
     photos_alone(folder / "photos_alone")
     if importlib.util.find_spec("torch") is not None:
@@ -89,6 +94,7 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
     "edit -o, splats": DiskCommand("edit {s}/splats {s}/e.yaml -o {out}", "new"),
     "edit --overwrite": DiskCommand("edit {out} {s}/e.yaml", "scene", on_disk="voxels"),
     "edit --append": DiskCommand("edit {out} {s}/e.yaml --append", "scene", on_disk="voxels"),
+    "hotspot": DiskCommand("hotspot {out} --add top --at 0 0 0.5", "scene", on_disk="voxels"),
     "train, voxels": DiskCommand(_TRAIN + " --field voxel", "new"),
     "train, splats": DiskCommand("train {s}/photos -o {out} --steps 3 --field splat", "new"),
     "train, nerf": DiskCommand(_TRAIN + " --field nerf", "new"),
@@ -101,6 +107,9 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
     "export, a page": DiskCommand("export {s}/splats -o {out}", "x.html"),
     "export, a page of voxels": DiskCommand("export {s}/voxels -o {out}", "x.html"),
     "export --embed": DiskCommand("export {s}/voxels -o {out} --as page --embed", "x"),
+    "export, a sequence": DiskCommand(
+        "export {s}/splats -o {out}/f_%04d.ply --camera-path {s}/path.json --fps 2", "frames", keeps=True
+    ),
     "export, a mesh .ply": DiskCommand("export {s}/voxels -o {out} --as mesh", "m.ply"),
     "export, a mesh .glb": DiskCommand("export {s}/voxels -o {out} --as mesh", "m.glb"),
     "export, points": DiskCommand("export {s}/voxels -o {out} --as points --splats 500", "p.ply"),

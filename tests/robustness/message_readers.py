@@ -16,7 +16,7 @@ from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from scenes import ball_scene
 
-_MESSAGES = 33
+_MESSAGES = 50
 
 
 def _make_messages(folder: Path) -> None:
@@ -73,7 +73,18 @@ def _make_messages(folder: Path) -> None:
         {"type": "play_end", "play": 1},
         {"type": "render", "what": "camera_path", "out": "a.mp4", "width": 64, "height": 64, "fps": 4.0},
         {"type": "cancel_job", "job": 1},
+        {
+            "type": "put_hotspot",
+            "title": "<b>a</b>",
+            "text": "one\ntwo",
+            "position": [0.0, 0.0, 0.5],
+            "camera": {"c2w": camera["c2w"], "fov_y_deg": 40.0},
+        },
+        {"type": "put_hotspot", "hotspot": 1, "title": "b", "position": [0.0, 0.5, 0.0]},
+        {"type": "move_hotspot", "hotspot": 2, "to": 0},
+        {"type": "move_hotspot", "hotspot": 1},
     ]
+    assert len(messages) == _MESSAGES
     for number, message in enumerate(messages):
         (folder / f"message{number:02}.json").write_text(json.dumps(message))
 
@@ -81,11 +92,13 @@ def _make_messages(folder: Path) -> None:
 _BEGUN_BY = {
     "message05.json": "message04.json",
     "message06.json": "message04.json",
-    "message29.json": "message28.json",
-    "message30.json": "message28.json",
-    "message32.json": "message31.json",
+    "message42.json": "message41.json",
+    "message43.json": "message41.json",
+    "message47.json": "message46.json",
+    "message48.json": "message46.json",
+    "message49.json": "message46.json",
 }
-"""Messages of a drag, and of a preview, need one that begins it."""
+"""Messages of a drag, a preview or a hotspot need one that begins it."""
 
 
 def _read_messages(folder: Path) -> None:

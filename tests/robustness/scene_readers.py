@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+import yaml
 from reader_seeds import Reader, example_edits, example_keys, written
 
-from cagefield import Scene
+from cagefield import Hotspot, Scene
 from cagefield.cameras.camera_paths import load_camera_path
 from cagefield.cameras.keyframe_files import dump_path, load_keys
 from cagefield.edits import EditStack, dump_edits, load_edits
 from cagefield.errors import CagefieldError
 from cagefield.fields.nerf_file import load_nerf, save_nerf
+from cagefield.scene.hotspots import resolved_view, view_of_camera
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from nerf_networks import small_field
@@ -23,12 +26,38 @@ from scenes import ball_cameras, ball_field, ball_scene
 from splat_scenes import ball_of_splats
 
 
+def example_hotspots() -> tuple[Hotspot, ...]:
+    """A hotspot with a camera and markup in its texts, and one without."""
+    view = view_of_camera(ball_scene().cameras["test"][0])
+    return (
+        Hotspot("<b>Top</b>", (0.0, 0.0, 0.5), "</script>\nsecond line", view),
+        Hotspot("Side", (0.5, 0.0, 0.0)),
+    )
+
+
+def _make_hotspots(folder: Path) -> None:
+    make_scene_folder(folder)
+    document = {"hotspots": [hotspot.to_dict() for hotspot in example_hotspots()]}
+    (folder / "hotspots.yaml").write_text(yaml.safe_dump(document))
+
+
+def _read_hotspots(folder: Path) -> None:
+    from cagefield.scene.hotspots import hotspots_from_file
+
+    scene = dataclasses.replace(
+        opened_scene(folder / "scene"), hotspots=hotspots_from_file(folder / "hotspots.yaml")
+    )
+    for hotspot in scene.hotspots:
+        resolved_view(hotspot, scene.first_camera, scene.up)
+
+
 def make_scene_folder(
     folder: Path, resolution: int = 17, cameras: int = 3, edits: Callable[[], EditStack] = example_edits
 ) -> None:
     """A scene of the ball; it has `cameras` to train from."""
     seen = ball_scene().cameras | {"train": ball_cameras(cameras)}
-    Scene(ball_field(resolution=resolution), cameras=seen).with_edits(edits()).save(folder / "scene")
+    scene = Scene(ball_field(resolution=resolution), cameras=seen, hotspots=example_hotspots())
+    scene.with_edits(edits()).save(folder / "scene")
     (folder / "scene" / "camera_path.json").write_text(dump_path(example_keys(), loop=True))
 
 
@@ -162,6 +191,7 @@ SCENE_READERS: dict[str, Reader] = {
     "scene folder": scene_reader(),
     **field_readers(),
     "autosave": autosave_reader(),
+    "hotspots": Reader(_make_hotspots, _read_hotspots, {"hotspots.yaml": "yaml"}),
     **path_readers(),
     "dataparser_transforms": Reader(
         partial(_make_path, 3, 4.0), _read_path, {"dataparser_transforms.json": "json"}

@@ -53,6 +53,7 @@ export function state(change: Partial<State> = {}): State {
     meters_per_unit: null,
     keys: [],
     loop: false,
+    hotspots: [],
     selection: null,
     removed: null,
     isolated: false,

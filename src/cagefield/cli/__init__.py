@@ -71,6 +71,7 @@ def parse(args: list[str]) -> Command | int:
     from cagefield.cli.demo import Demo
     from cagefield.cli.edit import ApplyEdits
     from cagefield.cli.export import Export
+    from cagefield.cli.hotspot import HotspotCommand
     from cagefield.cli.import_field import ImportField
     from cagefield.cli.info import Info
     from cagefield.cli.make_scene import MakeScene
@@ -96,6 +97,7 @@ def parse(args: list[str]) -> Command | int:
         | Annotated[ApplyEdits, tyro.conf.subcommand("edit")]
         | Annotated[Select, tyro.conf.subcommand("select")]
         | Annotated[Align, tyro.conf.subcommand("align")]
+        | Annotated[HotspotCommand, tyro.conf.subcommand("hotspot")]
         | Annotated[Export, tyro.conf.subcommand("export")]
         | Annotated[Render, tyro.conf.subcommand("render")]
         | Annotated[Info, tyro.conf.subcommand("info")]

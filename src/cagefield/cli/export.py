@@ -55,6 +55,9 @@ class Export:
     embed: Flag = False
     """A page as a folder for a web site, to be shown in an <iframe>: its field is a file of its own, which
     shows coarsely while it loads."""
+    levels: Flag = False
+    """With --embed, of splats: levels of detail. A coarse level shows first, and details come where the
+    camera looks. Edits are baked in."""
     selection: str | None = None
     """Only a cage's content: an edit's name (its inner cage, where the edit has taken it), an edit file, or
     a cage such as '{center: [0, 0, 1], size: 2}'."""
@@ -97,6 +100,8 @@ class Export:
             return self._sequence()
         if self.embed or self.out.suffix.lower() == ".html":
             return self._page()
+        if self.levels:
+            raise CagefieldError("--levels is for a page; give --embed and the name of a folder")
         self._check()
         from cagefield.compute import devices
         from cagefield.exporting import cages_of
@@ -127,6 +132,10 @@ class Export:
             raise CagefieldError(
                 "a page shows the scene's own camera path; leave out --camera-path and --add"
             )
+        if self.levels and not self.embed:
+            raise CagefieldError(
+                "--levels writes files beside the page; give --embed and the name of a folder"
+            )
         if self.embed and self.out.suffix.lower() == ".html":
             raise CagefieldError(f"{self.out}: --embed writes a folder; give a name without .html")
         if self.embed:
@@ -137,12 +146,13 @@ class Export:
         devices.start(self.device)
         path = self.scene / "camera_path.json"
         keys, loop = load_keys(path) if path.exists() else ((), False)
-        with progress_bar("Edits along the path") as move:
+        with progress_bar("Levels of detail" if self.levels else "Edits along the path") as move:
             page = ScenePage.build(
                 scene,
                 real_path(self.scene).name,
                 keys,
                 loop=loop,
+                levels=self.levels,
                 on_progress=lambda done: move(done, 1.0, ""),
             )
         if self.embed:
@@ -158,7 +168,13 @@ class Export:
         shown = f"{edits} edit{'s' * (edits != 1)}, " if edits else "no edits, "
         way = f"a camera path of {len(keys)} keys" if len(keys) > 1 else "no camera path"
         print(f"a page of {size / 1e6:.1f} MB: {shown}{way}")
-        if size > LARGE_PAGE_BYTES:
+        if page.nodes:
+            first = size - sum(map(len, page.nodes.values()))
+            print(
+                f"levels of detail: {first / 1e6:.1f} MB until the first picture, {len(page.nodes)} nodes; "
+                "edits baked in"
+            )
+        if size > LARGE_PAGE_BYTES and not page.nodes:
             warnings.warn(
                 f"the page has {size / 1e6:.0f} MB, more than the {LARGE_PAGE_BYTES / 1e6:.0f} that most "
                 "sites and phones take well; a smaller field, or fewer splats, make a smaller one",

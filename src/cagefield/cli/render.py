@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Render:
-    """Pictures or a video of a scene: its test views, an orbit, or a nerfstudio camera path."""
+    """Pictures or a video of a scene: its test views, an orbit, a camera path, or a tour of its hotspots."""
 
     scene: tyro.conf.Positional[Path]
     """Scene folder."""
@@ -43,6 +43,8 @@ class Render:
     """Number of pictures on an orbit around the cameras' common target, instead of the split's cameras."""
     camera_path: Path | None = None
     """nerfstudio camera-path JSON, instead of the split's cameras."""
+    hotspots: float | None = None
+    """Tour of the scene's hotspots, with a stop of so many seconds at each, in place of the cameras."""
     dataparser_transforms: Path | None = None
     """nerfstudio's dataparser_transforms.json, to bring its camera path back into the data set's space."""
     size: str | None = None
@@ -188,8 +190,10 @@ class Render:
             raise CagefieldError(
                 f"--turntable is {self.turntable!s:.20}; give the number of pictures, 1 to 100000"
             )
-        if self.turntable and self.camera_path:
-            raise CagefieldError("--turntable and --camera-path exclude each other; give one of them")
+        if sum((self.turntable > 0, self.camera_path is not None, self.hotspots is not None)) > 1:
+            raise CagefieldError(
+                "--turntable, --camera-path and --hotspots exclude each other; give one of them"
+            )
         if self.dataparser_transforms and not self.camera_path:
             raise CagefieldError("--dataparser-transforms belongs to --camera-path; give both or neither")
         if self.compare and self.unedited:
@@ -218,6 +222,8 @@ class Render:
         if self.camera_path:
             path = load_camera_path(self.camera_path, self.dataparser_transforms)
             cameras, fps = path.cameras, path.fps
+        elif self.hotspots is not None:
+            return self._tour(scene, self.hotspots)
         elif self.turntable:
             seen = scene.cameras.get("train") or next((c for c in scene.cameras.values() if c), ())
             if not seen:
@@ -229,6 +235,17 @@ class Render:
         if self.size is None:
             return list(cameras), self.fps or fps
         return [c.resized(*parse_size(self.size, c.width, c.height)) for c in cameras], self.fps or fps
+
+    def _tour(self, scene: Scene, stop_seconds: float) -> tuple[list[Camera], float]:
+        """Cameras of the tour of the hotspots, and the frame rate."""
+        from cagefield.scene.hotspot_tour import tour_cameras
+
+        first, fps = scene.first_camera, self.fps or 24.0
+        width, height = parse_size(self.size, first.width, first.height)
+        cameras = tour_cameras(
+            scene.hotspots, first, scene.up, stop_seconds=stop_seconds, fps=fps, width=width, height=height
+        )
+        return list(cameras), fps
 
     def _split_cameras(self, scene: Scene) -> tuple[Camera, ...]:
         cameras = scene.cameras.get(self.split, ())

@@ -104,26 +104,54 @@ def encode_page_splats(
     order, ends = _layout(field)
     centre = field.center
     shown = np.where(splats.is_pasted, np.float32(0.0), field.opacities)
-    steps = np.maximum(np.abs(field.sh[:, 1:]).max(axis=(0, 2), initial=0.0) / 127.0, SH_STEP)
-    levels, arrays = [], {}
+    steps = coefficient_steps(field)
+    arrays = {}
     for number, (first, end) in enumerate(zip((0, *ends), ends, strict=False)):
-        rows = order[first:end]
-        chunks, means = encode_means(field.means[rows], centre, field)
-        parts = {
-            "chunks": chunks,
-            "means": means,
-            **encode_shapes(field.quaternions[rows], field.log_scales[rows], shown[rows]),
-            "colours": byte_pairs(np.clip(32768 + np.round(field.sh[rows, 0] / COLOUR_STEP), 0, 65535).T),
-            "sh": (128 + np.round(field.sh[rows, 1:] / steps[:, None])).astype(np.uint8).transpose(1, 2, 0),
-        }
-        levels.append(end)
+        parts = encode_level(field, order[first:end], shown, centre, steps, field)
         arrays.update({f"{number}.{name}": part for name, part in parts.items()})
-    header = {
+    return pack(MAGIC, VERSION, splat_header(field, centre, steps, background, list(ends)), arrays)
+
+
+def coefficient_steps(field: SplatField) -> NDArray[np.float64]:
+    """Steps [K - 1] of the 8-bit values of coefficients from degree 1 on."""
+    return np.asarray(np.maximum(np.abs(field.sh[:, 1:]).max(axis=(0, 2), initial=0.0) / 127.0, SH_STEP))
+
+
+def encode_level(
+    field: SplatField,
+    rows: NDArray[np.int64],
+    opacities: AnyArray,
+    center: AnyArray,
+    steps: AnyArray,
+    whole: SplatField,
+) -> dict[str, NDArray[Any]]:
+    """Arrays of a level with some rows of a field; means are as exact as those of the `whole` field."""
+    chunks, means = encode_means(field.means[rows], center, whole)
+    return {
+        "chunks": chunks,
+        "means": means,
+        **encode_shapes(field.quaternions[rows], field.log_scales[rows], opacities[rows]),
+        "colours": byte_pairs(np.clip(32768 + np.round(field.sh[rows, 0] / COLOUR_STEP), 0, 65535).T),
+        "sh": np.clip(128 + np.round(field.sh[rows, 1:] / steps[:, None]), 0, 255)
+        .astype(np.uint8)
+        .transpose(1, 2, 0),
+    }
+
+
+def splat_header(
+    field: SplatField,
+    center: AnyArray,
+    steps: AnyArray,
+    background: tuple[float, float, float] | None,
+    levels: list[int],
+) -> dict[str, Any]:
+    """Header of a file of splats."""
+    return {
         "count": len(field),
         "degree": field.sh_degree,
         "antialiased": field.antialiased,
         "bounds": field.bounds.tolist(),
-        "centre": centre.tolist(),
+        "centre": center.tolist(),
         "near": near_depth(field.bounds),
         "background": None if background is None else list(background),
         "log_scales": list(SCALES),
@@ -131,7 +159,6 @@ def encode_page_splats(
         "steps": [float(step) for step in steps],
         "levels": levels,
     }
-    return pack(MAGIC, VERSION, header, arrays)
 
 
 def decode_page_splats(data: bytes) -> PageSplats:

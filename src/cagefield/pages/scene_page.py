@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import hashlib
 import html
 import json
@@ -16,15 +17,16 @@ from typing import Any
 
 import numpy as np
 
-from cagefield.cameras.camera import Camera, turntable
+from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Keyframe, stills
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
-from cagefield.exporting import FOV_X
+from cagefield.exporting import edited_splats
 from cagefield.files.atomic import recover_folder, replaced_folder
 from cagefield.pages.page_edits import encode_page_edits, for_pages
 from cagefield.pages.page_field import encode_page_field
 from cagefield.pages.page_file import bytes_until
+from cagefield.pages.page_nodes import NODE_NAME, encode_page_nodes
 from cagefield.pages.page_splat_edits import encode_page_splat_edits
 from cagefield.pages.page_splats import encode_page_splats
 from cagefield.pages.path_states import PathEdits, path_edits
@@ -33,6 +35,7 @@ from cagefield.rendering.splats.raster_splats import changed_splats
 from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.splats.splitting import split_of
 from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
+from cagefield.scene.hotspots import resolved_view
 from cagefield.scene.scene import Scene
 
 _HERE = files("cagefield.pages")
@@ -62,6 +65,8 @@ class ScenePage:
     header: Mapping[str, Any]
     files: Mapping[str, bytes]
     along: PathEdits | None
+    nodes: Mapping[str, bytes] = dataclasses.field(default_factory=dict)
+    """Files of levels of detail by name (`page_nodes`), in the folder form alone."""
 
     @classmethod
     def build(
@@ -72,19 +77,32 @@ class ScenePage:
         *,
         loop: bool = False,
         step: float = 0.5,
+        levels: bool = False,
         on_progress: Callable[[float], None] = lambda done: None,
     ) -> ScenePage:
         """The page of an edited scene, with the camera path of `keys`.
 
-        `step` is the distance between samples in voxels. `on_progress` is told how much is done of the edits
-        along the path.
+        `step` is the distance between samples in voxels. With `levels`, splats get levels of detail, for a
+        folder (`page_nodes`): edits are baked in, so that the page does not show the scene before them, and
+        stand still along the path. `on_progress` is told how much is done of the edits along the path, or of
+        the levels.
 
         Raises:
             CagefieldError: the scene holds discs (2DGS).
             EditError: edits that cannot be evaluated, or more than a page takes.
         """
+        nodes: Mapping[str, bytes] = {}
         field = scene.rendered_field
-        if isinstance(field, SplatSet):
+        if levels:
+            if not isinstance(field, SplatSet):
+                raise CagefieldError(
+                    "the scene holds voxels, whose pages have levels already; leave out --levels"
+                )
+            coarse, nodes = encode_page_nodes(
+                edited_splats(scene), background=scene.background, on_progress=on_progress
+            )
+            found, along = {"field": coarse}, None
+        elif isinstance(field, SplatSet):
             found, along = _splat_files(scene, field, keys, loop, on_progress)
         else:
             plain = VoxelRenderer(field, EditStack([]), preserve_opacity=scene.preserve_opacity)
@@ -94,14 +112,19 @@ class ScenePage:
             along = path_edits(plain, scene.edits, keys, loop, scene.patcher, on_progress=on_progress)
         if along is not None:
             found["path"] = along.data
-        header = {
-            "start": _view(_start(scene)),
+        header: dict[str, Any] = {
+            "start": _view(scene.first_camera),
             "up": scene.up.tolist(),
             "centre": scene.field.center.tolist(),
             "background": None if scene.background is None else list(scene.background),
             "path": _path(keys, loop),
+            "extent": 2.0 * float(np.linalg.norm(scene.field.half_size)),
         }
-        return cls(title, header, found, along)
+        if scene.hotspots:
+            header["hotspots"] = _hotspots(scene)
+        if scene.alignment.meters_per_unit is not None:
+            header["meters_per_unit"] = scene.alignment.meters_per_unit
+        return cls(title, header, found, along, nodes)
 
     def one_file(self) -> str:
         """The text of an HTML file that needs neither server nor network.
@@ -109,6 +132,8 @@ class ScenePage:
         The viewer comes first and the coarse level next, so that a browser shows it while the rest is on its
         way.
         """
+        if self.nodes:
+            raise CagefieldError("levels of detail are files beside a page; write a folder (--embed)")
         field, coarse = self.files["field"], bytes_until(self.files["field"], "1.")
         order = [("field", field[:coarse]), *((n, self.files[n]) for n in ("edits",) if n in self.files)]
         order += [("field", field[coarse:]), *((n, self.files[n]) for n in ("path",) if n in self.files)]
@@ -128,6 +153,8 @@ class ScenePage:
         for name, data in self.files.items():
             written[NAMES[name]] = data
             entries[name] = {"bytes": len(data), "url": _address(NAMES[name], data)}
+        written.update(self.nodes)
+        entries["field"]["bytes"] = len(self.files["field"]) + sum(map(len, self.nodes.values()))
         script = f'<script src="{_address(SCRIPT, written[SCRIPT])}"></script>'
         written[INDEX] = self._html(FOLDER, entries, script).encode()
         return written
@@ -150,7 +177,9 @@ def write_folder(folder: Path, written: Mapping[str, bytes]) -> None:
     Other files of an older folder stay.
     """
     recover_folder(folder, lambda left: (left / SCRIPT).is_file())
-    with replaced_folder(folder, [INDEX, SCRIPT, *NAMES.values()]) as draft:
+    former = [path.name for path in folder.glob(f"{NODE_NAME}.*")] if folder.is_dir() else []
+    names = {INDEX, SCRIPT, *NAMES.values(), *former, *written}
+    with replaced_folder(folder, sorted(names)) as draft:
         for name, data in written.items():
             (draft / name).write_bytes(data)
 
@@ -201,22 +230,25 @@ def _script(name: str, data: bytes | None) -> str:
     return f'<script>cagefieldViewer.take("{name}",{text})</script>'
 
 
-def _start(scene: Scene) -> Camera:
-    """The first test camera, or any, or one in front of a scene without cameras."""
-    for split in ("test", "val", "train"):
-        if scene.cameras.get(split):
-            return scene.cameras[split][0]
-    bounds = scene.field.bounds
-    radius = 0.6 * float(np.linalg.norm(bounds[1] - bounds[0])) / math.sin(0.5 * FOV_X)
-    return turntable(
-        bounds.mean(axis=0), radius, 1, elevation=0.3, up=scene.up, width=400, height=400, fov_x=FOV_X
-    )[0]
-
-
 def _view(camera: Camera) -> dict[str, Any]:
     """A camera's pose, and the field of view of its shorter side, which the window's shorter side has."""
     least = min(camera.width / camera.fx, camera.height / camera.fy)
     return {"c2w": camera.c2w.ravel().tolist(), "fov_y_deg": math.degrees(2.0 * math.atan(0.5 * least))}
+
+
+def _hotspots(scene: Scene) -> list[dict[str, Any]]:
+    """Texts, positions and views of the scene's hotspots."""
+    first, up = scene.first_camera, scene.up
+    views = [resolved_view(hotspot, first, up) for hotspot in scene.hotspots]
+    return [
+        {
+            "title": hotspot.title,
+            "text": hotspot.text,
+            "position": list(hotspot.position),
+            "view": {"c2w": list(view.c2w), "fov_y_deg": view.fov_y_deg},
+        }
+        for hotspot, view in zip(scene.hotspots, views, strict=True)
+    ]
 
 
 def _path(keys: tuple[Keyframe, ...], loop: bool) -> dict[str, Any] | None:

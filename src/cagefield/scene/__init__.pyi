@@ -1,3 +1,5 @@
 from .alignment import Alignment as Alignment
+from .hotspots import Hotspot as Hotspot
+from .hotspots import HotspotView as HotspotView
 from .paste_alignment import align_paste as align_paste
 from .scene import Scene as Scene

@@ -12,6 +12,7 @@ import numpy as np
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.images.render_result import background_rgb
 from cagefield.scene.alignment import Alignment
+from cagefield.scene.hotspots import Hotspot, hotspots_from_value
 from cagefield.scene.scene_files import FORMAT, MANIFEST, VERSION, check_part, read_json
 from cagefield.typing import Array
 
@@ -27,6 +28,7 @@ class Manifest(NamedTuple):
     preserve_opacity: bool
     source_to_world: Any
     alignment: Alignment
+    hotspots: tuple[Hotspot, ...] = ()
 
 
 def read_manifest(folder: Path) -> Manifest:
@@ -58,10 +60,11 @@ def read_manifest(folder: Path) -> Manifest:
         raise SceneError(f"{path}: {error!s:.200}") from None
     try:
         alignment = Alignment.from_value(document.get("alignment", {}))
+        hotspots = hotspots_from_value(document.get("hotspots", []))
     except SceneError as error:
         raise SceneError(f"{path}: {error}; correct or remove the entry in the file") from None
     gains = document.get("gains", ())
-    return Manifest(background, gains, opacity, document.get("source_to_world"), alignment)
+    return Manifest(background, gains, opacity, document.get("source_to_world"), alignment, hotspots)
 
 
 def manifest_document(manifest: Manifest) -> Mapping[str, object]:
@@ -79,6 +82,8 @@ def manifest_document(manifest: Manifest) -> Mapping[str, object]:
         document["source_to_world"] = manifest.source_to_world.tolist()
     if manifest.alignment:
         document["alignment"] = manifest.alignment.to_dict()
+    if manifest.hotspots:
+        document["hotspots"] = [hotspot.to_dict() for hotspot in manifest.hotspots]
     return document
 
 

@@ -8,7 +8,8 @@
       scene.json          {"format": "cagefield-scene", "version": 1, "background": [r, g, b] or null,
                           "gains": [[r, g, b], ...] if photos were brighter or darker than the field,
                           "preserve_opacity": false if edits leave density as it is,
-                          "source_to_world": [4,4] from the reconstruction's coordinates, if not the same}
+                          "source_to_world": [4,4] from the reconstruction's coordinates, if not the same,
+                          "alignment", "hotspots", if any}
 
 Edits may paste from other scenes (`edits.Paste`), whose folders stay where they are: relative paths of
 sources are relative to SCENE.
@@ -20,6 +21,7 @@ a half of each.
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -32,7 +34,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cagefield.cameras.camera import Camera
+from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion.pasting.paste_content import content_box
 from cagefield.compute.cancellation import check_cancelled
 from cagefield.edits import EditStack, LatticeError, Paste, PreparedStack
@@ -49,6 +51,7 @@ from cagefield.files.atomic import replaced_file, replaced_folder
 from cagefield.files.safe_open import real_path
 from cagefield.images.render_result import Background, RenderResult, background_rgb
 from cagefield.scene.alignment import Alignment
+from cagefield.scene.hotspots import Hotspot, check_count
 from cagefield.scene.manifest import (
     Manifest,
     checked_affine,
@@ -94,6 +97,10 @@ if TYPE_CHECKING:
         def gains(self) -> NDArray[np.float32] | None: ...
 
 
+FRONT_FOV_X = math.radians(45.0)
+"""Horizontal field of view of the camera in front of a scene without cameras."""
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Scene:
     """A field with its edit stack, cameras by split ("train", "test", "val") and background colour.
@@ -107,7 +114,8 @@ class Scene:
     `source_to_world` [4,4] maps the coordinates of the reconstruction that the cameras came from to the
     scene's (`Dataset.source_to_world`); the identity where they are the same or nothing is known.
     `removal` has the whole field, which is saved, where `field` is without deleted elements. `alignment` has
-    the meters per unit and the up direction that exports honor.
+    the meters per unit and the up direction that exports honor. `hotspots` are points with text, positions in
+    deformed space, which the editor and exported pages show.
 
     Raises:
         CagefieldError: a background outside [0, 1].
@@ -127,6 +135,7 @@ class Scene:
     source_to_world: Array = dataclasses.field(default_factory=partial(np.eye, 4))
     removal: Removal | None = None
     alignment: Alignment = dataclasses.field(default_factory=Alignment)
+    hotspots: tuple[Hotspot, ...] = ()
 
     def __post_init__(self) -> None:
         cameras = {str(split): tuple(members) for split, members in self.cameras.items()}
@@ -136,6 +145,8 @@ class Scene:
             raise SceneError(f"scene version is {self.version!r}; this cagefield writes version {VERSION}")
         object.__setattr__(self, "gains", checked_gains(self.gains, len(cameras.get("train", ()))))
         object.__setattr__(self, "source_to_world", checked_affine(self.source_to_world))
+        object.__setattr__(self, "hotspots", tuple(self.hotspots))
+        check_count(len(self.hotspots))
 
     @classmethod
     def trained(cls, result: Trained, dataset: Dataset) -> Scene:
@@ -249,6 +260,7 @@ class Scene:
                 source_to_world=np.eye(4) if manifest.source_to_world is None else manifest.source_to_world,
                 removal=removal,
                 alignment=manifest.alignment,
+                hotspots=manifest.hotspots,
             )
         except SceneError as error:
             raise SceneError(f"{folder / MANIFEST}: {error}") from None
@@ -296,7 +308,12 @@ class Scene:
     def draft_manifest(self, folder: Path) -> Iterator[None]:
         """The manifest is written when the context begins and takes its place in the folder when it ends."""
         manifest = Manifest(
-            self.background, self.gains, self.preserve_opacity, self.source_to_world, self.alignment
+            self.background,
+            self.gains,
+            self.preserve_opacity,
+            self.source_to_world,
+            self.alignment,
+            self.hotspots,
         )
         with replaced_file(folder / MANIFEST, parents=False) as draft:
             write_json(manifest_document(manifest), draft)
@@ -451,6 +468,19 @@ class Scene:
         if self.alignment.up is not None:
             return self.alignment.up
         return up_of_cameras(self.cameras)
+
+    @property
+    def first_camera(self) -> Camera:
+        """The view in which the scene opens: its first test camera, or any, else one in front of it."""
+        for split in ("test", "val", "train"):
+            if self.cameras.get(split):
+                return self.cameras[split][0]
+        low, high = self.field.bounds
+        radius = 0.6 * float(np.linalg.norm(high - low)) / math.sin(0.5 * FRONT_FOV_X)
+        middle = 0.5 * (low + high)
+        return turntable(
+            middle, radius, 1, elevation=0.3, up=self.up, width=400, height=400, fov_x=FRONT_FOV_X
+        )[0]
 
     @cached_property
     def sources(self) -> SceneSources:

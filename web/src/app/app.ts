@@ -55,6 +55,7 @@ const CANVAS_KEYS = [
   "hover",
   "selecting",
   "measured",
+  "placesHotspot",
   "cages",
   "grid",
   "view",
@@ -230,7 +231,11 @@ export class App {
     this.highlight.draw(selection !== null && this.drag === null && now.preview === null && !now.before);
     const hasGizmo = now.tool !== "select" || now.corners.length > 0;
     const isMovable =
-      edit !== null && dragObstacle(now, edit) === null && now.selecting === null && now.measured === null;
+      edit !== null &&
+      dragObstacle(now, edit) === null &&
+      now.selecting === null &&
+      now.measured === null &&
+      !now.placesHotspot;
     if (!isMovable || !showsCages(now) || !hasGizmo) {
       this.gizmo.hide();
       return;

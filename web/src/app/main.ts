@@ -13,6 +13,7 @@ import { h } from "../ui/dom";
 import { editsList } from "../ui/edits_list";
 import { help } from "../ui/help";
 import { historyList } from "../ui/history_list";
+import { Hotspots } from "../ui/hotspot_list";
 import { jobs } from "../ui/jobs";
 import { options } from "../ui/options";
 import { overlay } from "../ui/overlay";
@@ -32,6 +33,8 @@ const actions = new Actions(app, () => questions.saveAs());
 const regions = new RegionTools(app);
 const pointer = new Pointer(app);
 const measure = new MeasureTool(app, (distance) => questions.scale(distance));
+const hotspots = new Hotspots(app, actions, questions);
+pointer.placeHotspot = (x, y) => hotspots.place(x, y);
 pointer.measure = (x, y) => measure.add(x, y);
 const keys = bindings(app, actions, pointer, regions, questions);
 listenForKeys(app, actions, pointer, keys);
@@ -45,10 +48,11 @@ const controls = h(
   selectionPanel(app, actions),
   historyList(app),
   pathList(app, actions, questions),
+  hotspots.panel,
   jobs(app),
 );
 const panel = h("aside", { class: "panel" }, controls);
-view.append(regions.element, measure.element, overlay(app, pointer));
+view.append(regions.element, measure.element, hotspots.marks, overlay(app, pointer));
 root.append(
   topbar(app, actions, questions),
   toolbar(app, actions),

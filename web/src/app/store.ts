@@ -76,6 +76,8 @@ export interface Editor {
   selecting: SelectTool | null;
   /** The points of the measured distance, world space, two at most; null without the measuring tool. */
   measured: Vec3[] | null;
+  /** Whether a click places a hotspot. */
+  placesHotspot: boolean;
   selectMode: SelectMode;
   /** Radius of the brush, a share of the height of the view. */
   brushRadius: number;
@@ -124,6 +126,7 @@ export const INITIAL: Editor = {
   hover: null,
   selecting: null,
   measured: null,
+  placesHotspot: false,
   selectMode: "replace",
   brushRadius: 0.04,
   through: false,

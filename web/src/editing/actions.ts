@@ -49,19 +49,35 @@ export class Actions {
   ) {}
 
   setTool(tool: Tool): void {
-    this.app.store.set({ tool, selecting: null, measured: null });
+    this.app.store.set({ tool, selecting: null, measured: null, placesHotspot: false });
   }
 
   /** Takes a tool that selects elements, or puts it away. */
   toggleSelecting(tool: SelectTool): void {
     const { selecting } = this.app.store.now;
-    this.app.store.set({ selecting: selecting === tool ? null : tool, measured: null, hover: null });
+    this.app.store.set({
+      selecting: selecting === tool ? null : tool,
+      measured: null,
+      placesHotspot: false,
+      hover: null,
+    });
   }
 
   /** Takes the measuring tool, or puts it away. */
   toggleMeasuring(): void {
     const { measured } = this.app.store.now;
-    this.app.store.set({ measured: measured === null ? [] : null, selecting: null, hover: null });
+    this.app.store.set({
+      measured: measured === null ? [] : null,
+      placesHotspot: false,
+      selecting: null,
+      hover: null,
+    });
+  }
+
+  /** Takes the tool that places hotspots, or puts it away. */
+  toggleHotspots(): void {
+    const { placesHotspot } = this.app.store.now;
+    this.app.store.set({ placesHotspot: !placesHotspot, measured: null, selecting: null, hover: null });
   }
 
   /** Changes the size of the brush by a step; false where the brush is not the tool. */
@@ -361,6 +377,7 @@ export class Actions {
     if (cancelDrag()) return;
     if (now.help) this.app.store.set({ help: false });
     else if (now.measured !== null) this.app.store.set({ measured: null });
+    else if (now.placesHotspot) this.app.store.set({ placesHotspot: false });
     else if (now.selecting !== null) this.app.store.set({ selecting: null });
     else if (now.corners.length > 0) this.app.store.set({ corners: [] });
     else if (now.state?.selected != null) this.command("select", null);

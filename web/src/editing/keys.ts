@@ -69,6 +69,12 @@ export function bindings(
       run: () => actions.toggleMeasuring(),
     },
     {
+      group: "Scene",
+      keys: ["Shift+H"],
+      action: "Place hotspots: points with a title and text, for exported pages",
+      run: () => actions.toggleHotspots(),
+    },
+    {
       group: "Selection",
       keys: ["M"],
       action: "Brush: paint over elements; [ and ] change its size",

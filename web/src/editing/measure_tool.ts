@@ -53,14 +53,11 @@ export class MeasureTool {
     const { store, viewport, pictures } = this.host;
     const { measured } = store.now;
     if (measured === null) return;
-    const depth = pictures.depth.at(x / viewport.points.width, y / viewport.points.height);
-    if (depth === null) {
+    const point = surfacePoint(viewport, pictures, x, y);
+    if (point === null) {
       this.host.say("nothing is there to measure from; click on a surface", "warning");
       return;
     }
-    const { origin, direction } = viewport.ray(x, y);
-    const along = direction.toArray();
-    const point = origin.toArray().map((value, k) => value + depth * along[k]) as Vec3;
     const points = measured.length === 2 ? [point] : [...measured, point];
     store.set({ measured: points });
     if (points.length === 2 && !isReadOnly(store.now)) this.askScale(distanceOf(points));
@@ -88,6 +85,20 @@ export class MeasureTool {
     this.label.setAttribute("y", String(0.5 * (a.y + b.y) - LABEL_OFFSET_PIXELS));
     this.label.textContent = describeDistance(distanceOf(measured), state?.meters_per_unit ?? null);
   }
+}
+
+/** The point of the surface under a pixel of the view, world space; null where nothing is. */
+export function surfacePoint(
+  viewport: MeasureHost["viewport"],
+  pictures: MeasureHost["pictures"],
+  x: number,
+  y: number,
+): Vec3 | null {
+  const depth = pictures.depth.at(x / viewport.points.width, y / viewport.points.height);
+  if (depth === null) return null;
+  const { origin, direction } = viewport.ray(x, y);
+  const along = direction.toArray();
+  return origin.toArray().map((value, k) => value + depth * along[k]) as Vec3;
 }
 
 /** Distance between two points, world units. */

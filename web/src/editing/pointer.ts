@@ -33,6 +33,8 @@ export class Pointer {
   snapKey = false;
   /** Called with the position of each click while the measuring tool is taken. */
   measure: (x: number, y: number) => void = () => undefined;
+  /** Called with the position of each click while the tool that places hotspots is taken. */
+  placeHotspot: (x: number, y: number) => void = () => undefined;
   /** World axis to which a drag of corners is constrained. */
   private constraint: Constraint = null;
   private hold: Hold | null = null;
@@ -163,6 +165,7 @@ export class Pointer {
       this.app.endDrag();
     } else if (this.pressed && event.button === 0 && this.travelPixels() < MAX_CLICK_PIXELS) {
       if (this.app.store.now.measured !== null) this.measure(this.position.x, this.position.y);
+      else if (this.app.store.now.placesHotspot) this.placeHotspot(this.position.x, this.position.y);
       else if (event.altKey) this.chooseRow(event);
       else this.select();
     }
@@ -207,7 +210,7 @@ export class Pointer {
     const { now } = this.app.store;
     const edit = selectedEdit(now);
     this.app.gizmo.clearHover();
-    if (now.measured !== null) return null;
+    if (now.measured !== null || now.placesHotspot) return null;
     if (edit === null || !showsCages(now) || dragObstacle(now, edit) !== null) return null;
     const { project } = this.app.viewport;
     const { x, y } = this.position;
@@ -343,7 +346,8 @@ export class Pointer {
 
   private place(event: MouseEvent): void {
     this.readPosition(event);
-    if (!this.firstPress.release || event.altKey || this.app.store.now.measured !== null) return;
+    const { measured, placesHotspot } = this.app.store.now;
+    if (!this.firstPress.release || event.altKey || measured !== null || placesHotspot) return;
     const { width, height } = this.app.viewport.points;
     this.app.expectEdit();
     const at = { x: clamp(this.position.x / width), y: clamp(this.position.y / height) };

@@ -9,6 +9,12 @@ import type { Distances, View } from "./views";
 
 export interface LoadOptions {
   onArrival?: OnArrival;
+  /** Opens a file beside the scene's own: one with details. Without it the coarse level is all. */
+  openBeside?: (url: string) => Promise<ReadableStream<Bytes>>;
+  /** Called when details have replaced coarse parts of the scene. */
+  onDetails?: () => void;
+  /** Called where the GPU has no room for so many of the nodes of the scene's details. */
+  onCoarse?: (nodes: number, of: number) => void;
   /** Called when a level can be drawn, from coarse to fine; levels are numbered from 1. */
   onLevel?: (number: number, count: number) => void;
 }

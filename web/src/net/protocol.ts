@@ -53,7 +53,9 @@ export type PageMessage =
   | PlacePoint
   | Subdivide
   | PointReach
-  | PlaceMesh;
+  | PlaceMesh
+  | PutHotspot
+  | MoveHotspot;
 export type ServerMessage = Hello | State | Dragged | Answer | Notice | Preview | Preparing | Job;
 
 /**
@@ -360,6 +362,13 @@ export interface GoTo {
   entry: number;
 }
 /**
+ * Camera from which a hotspot is looked at.
+ */
+export interface HotspotCamera {
+  c2w: number[];
+  fov_y_deg: number;
+}
+/**
  * Shows the selected elements alone, on all pages, or all again.
  */
 export interface Isolate {
@@ -392,6 +401,14 @@ export interface Mirror {
   type: "mirror";
   edit: number;
   axis: "x" | "y" | "z";
+}
+/**
+ * Puts a hotspot at another place in the list, 0 first; None removes it.
+ */
+export interface MoveHotspot {
+  type: "move_hotspot";
+  hotspot: number;
+  to?: number | null;
 }
 /**
  * Makes the outer cage a margin around everything the inner cage is and was.
@@ -477,6 +494,17 @@ export interface PointReach {
 export interface PresentedMessage {
   type: "presented";
   picture: number;
+}
+/**
+ * A hotspot with all its values: a new one without a number, else in place of that one.
+ */
+export interface PutHotspot {
+  type: "put_hotspot";
+  hotspot?: number | null;
+  title: string;
+  text?: string;
+  position: Vec3;
+  camera?: HotspotCamera | null;
 }
 /**
  * Deletes the selected elements from the field, or restores all that were deleted.
@@ -734,6 +762,16 @@ export interface Hello {
   read_only: boolean;
 }
 /**
+ * A hotspot: its number, texts, position in deformed space, and the camera to look from, if any.
+ */
+export interface HotspotState {
+  id: number;
+  title: string;
+  text: string;
+  position: Vec3;
+  camera: HotspotCamera | null;
+}
+/**
  * How far a background job is; of one whose file is to be downloaded, `page` asked for it.
  */
 export interface Job {
@@ -797,6 +835,7 @@ export interface State {
   meters_per_unit: number | null;
   keys: Key[];
   loop: boolean;
+  hotspots: HotspotState[];
   selection: SelectionCount | null;
   removed: SelectionCount | null;
   isolated: boolean;

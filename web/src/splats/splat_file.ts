@@ -13,6 +13,16 @@ const CHUNK_SPLATS = 256;
  */
 export const RECORD_WORDS = 8;
 
+/** Splats near each other in a file of their own; see `cagefield.pages.page_nodes`. */
+export interface SplatNode {
+  count: number;
+  /** The splats [first, end) of the coarse level that stand for the node until it has arrived. */
+  coarse: [number, number];
+  bounds: [Vec3, Vec3];
+  url: string;
+  bytes: number;
+}
+
 export interface SplatHeader {
   count: number;
   degree: number;
@@ -30,6 +40,8 @@ export interface SplatHeader {
   steps: number[];
   /** Number of splats up to the end of each level. */
   levels: number[];
+  /** Nodes with the details of the coarse level; absent without levels of detail. */
+  nodes?: SplatNode[];
 }
 
 /** The splats of a level, numbered from `first` on. */
@@ -81,7 +93,15 @@ export async function* readSplatLevels(
         joinHighLowBytes(colors),
       );
       const harmonics = packHarmonics(await bytes("sh"), count, header.degree);
-      yield { header, first, count, last: number === header.levels.length - 1, means, records, harmonics };
+      yield {
+        header,
+        first,
+        count,
+        last: number === header.levels.length - 1 && !header.nodes,
+        means,
+        records,
+        harmonics,
+      };
       first = end;
     }
   } finally {

@@ -24,7 +24,9 @@ import { haveSameDepths, Sorter } from "./sorter";
 import { sortDepths } from "./splat_camera";
 import { CHANGED_WORDS } from "./splat_edits";
 import type { SplatEdits } from "./splat_edits";
+import { takeNext } from "./node_order";
 import { readSplatLevels } from "./splat_file";
+import type { SplatNode } from "./splat_file";
 import { SplatPasses } from "./splat_passes";
 import { PROJECTED_BYTES, SplatStore } from "./splat_store";
 import { WordTexture } from "./splat_textures";
@@ -118,11 +120,16 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     const wanted = (): boolean => turn === this.loading;
     let number = 0;
     let store: SplatStore | null = null;
+    let coarseBytes = 0;
     const begin = (header: SplatStore["header"]): void => {
       if (wanted()) store = new SplatStore(this.gl, header, this.memory);
     };
     try {
-      for await (const level of readSplatLevels(source, begin, options.onArrival)) {
+      const arrive = (bytes: number): void => {
+        coarseBytes = bytes;
+        options.onArrival?.(bytes);
+      };
+      for await (const level of readSplatLevels(source, begin, arrive)) {
         const own = store as SplatStore | null;
         if (!wanted() || own === null) return;
         await own.take(level, wanted);
@@ -134,10 +141,77 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
         this.level = { field: { background: level.header.background }, last: level.last };
         options.onLevel?.(++number, level.header.levels.length);
       }
+      const whole = store as SplatStore | null;
+      if (whole?.header.nodes && options.openBeside)
+        await this.loadNodes(whole, whole.header.nodes, options.openBeside, coarseBytes, options, wanted);
     } finally {
       const own = store as SplatStore | null;
       if (own !== null && this.store !== own) own.dispose();
     }
+  }
+
+  /** Loads details, nodes that the camera sees largest first, each in place of its coarse splats. */
+  private async loadNodes(
+    store: SplatStore,
+    nodes: readonly SplatNode[],
+    open: NonNullable<LoadOptions["openBeside"]>,
+    coarseBytes: number,
+    options: LoadOptions,
+    wanted: () => boolean,
+  ): Promise<void> {
+    const left = [...nodes];
+    let coarse = 0;
+    let arrived = coarseBytes;
+    let applying: Promise<void> = Promise.resolve();
+    let isApplying = false;
+    let storing: Promise<void> = Promise.resolve();
+    const apply = (): void => {
+      if (isApplying) return;
+      isApplying = true;
+      applying = this.applyNodes(store, wanted).finally(() => {
+        isApplying = false;
+        if (wanted()) options.onDetails?.();
+      });
+    };
+    const loadOne = async (node: SplatNode): Promise<void> => {
+      let before = 0;
+      const count = (bytes: number): void => {
+        arrived += bytes - before;
+        before = bytes;
+        options.onArrival?.(arrived);
+      };
+      for await (const level of readSplatLevels(await open(node.url), () => undefined, count)) {
+        storing = storing.then(async () => {
+          if (!wanted()) return;
+          if (store.hasRoomFor(level.count)) await store.storeNode(level, node.coarse, wanted);
+          else coarse += 1;
+        });
+        await storing;
+      }
+      apply();
+    };
+    const loadRest = async (): Promise<void> => {
+      for (let node = takeNext(left, this.camera); node && wanted(); node = takeNext(left, this.camera))
+        if (store.hasRoomFor(node.count)) await loadOne(node);
+        else coarse += 1;
+    };
+    // The next node is on its way while one is decoded.
+    await Promise.all([loadRest(), loadRest()]);
+    await applying;
+    await this.applyNodes(store, wanted);
+    if (!wanted()) return;
+    if (coarse > 0) options.onCoarse?.(coarse, nodes.length);
+    this.level = { field: { background: store.header.background }, last: true };
+    options.onLevel?.(2, 2);
+  }
+
+  /** Shows the stored nodes, once they are in order: no image has both a node and its coarse splats. */
+  private async applyNodes(store: SplatStore, wanted: () => boolean): Promise<void> {
+    const set = store.setWithNodes();
+    if (set === null) return;
+    const { camera } = this;
+    if (camera !== null) await this.sorters.before.prepare(set, sortDepths(store.header, camera, this.near));
+    if (wanted()) store.set = set;
   }
 
   /** Uploads the splats again after the context was lost and restored. */

@@ -1,7 +1,7 @@
 /** Dialogs before files are written: destination, size, format. */
 import type { App } from "../app/app";
 import { describeDistance } from "../editing/measure_tool";
-import type { ExportSplats } from "../net/protocol";
+import type { ExportSplats, HotspotState, PutHotspot } from "../net/protocol";
 import { h } from "./dom";
 
 const FORMS: [ExportSplats["form"], string][] = [
@@ -16,6 +16,18 @@ const FORMS: [ExportSplats["form"], string][] = [
   ["usdz", ".usdz: USD package, with usd-core"],
 ];
 
+/** Values of a hotspot; `id` is null for a new one. */
+export type HotspotDraft = Omit<HotspotState, "id"> & { id: number | null };
+
+/** The message that writes a hotspot. */
+export function putHotspot({ id, title, text, position, camera }: HotspotDraft): PutHotspot {
+  return { type: "put_hotspot", hotspot: id, title, text, position, camera };
+}
+
+/** Lengths that the server takes. */
+const MAX_TITLE = 120;
+const MAX_TEXT = 2000;
+
 export interface Dialogs {
   element: HTMLElement;
   saveAs: () => void;
@@ -23,12 +35,14 @@ export interface Dialogs {
   download: () => void;
   /** Asks how many meters a distance in units of the scene is. */
   scale: (distance: number) => void;
+  /** Asks for the title and the text of a hotspot; `before` are its values so far. */
+  hotspot: (before: HotspotDraft) => void;
   render: (what: "test_views" | "camera_path") => void;
 }
 
 export function dialogs(app: App): Dialogs {
   const host = h("div");
-  const field = (label: string, input: HTMLInputElement): HTMLElement =>
+  const field = (label: string, input: HTMLElement): HTMLElement =>
     h("label", { class: "field" }, h("span", {}, label), input);
   const text = (value: string): HTMLInputElement =>
     h("input", { type: "text", value, required: true, maxLength: 1000, spellcheck: false });
@@ -102,6 +116,30 @@ export function dialogs(app: App): Dialogs {
         const length = Number(meters.value);
         if (length > 0) app.send({ type: "scale_change", meters_per_unit: length / distance });
       });
+    },
+    hotspot(before) {
+      const title = h("input", { value: before.title, required: true, maxLength: MAX_TITLE, name: "title" });
+      const text = h("textarea", { value: before.text, maxLength: MAX_TEXT, name: "text", rows: 5 });
+      const keepsView = h("input", { type: "checkbox", name: "view", checked: before.camera !== null });
+      const fields = [field("Title", title), field("Text", text), field("Look from this view", keepsView)];
+      ask(
+        before.id === null ? "New hotspot" : "Hotspot",
+        before.id === null ? "Place" : "Change",
+        fields,
+        () => {
+          if (title.value.trim() === "") return;
+          const { camera, fov } = { camera: app.viewport.c2w, fov: app.viewport.camera.fov };
+          const view = before.camera ?? { c2w: camera, fov_y_deg: fov };
+          app.send(
+            putHotspot({
+              ...before,
+              title: title.value,
+              text: text.value,
+              camera: keepsView.checked ? view : null,
+            }),
+          );
+        },
+      );
     },
     download() {
       const form = h("select", {}, ...FORMS.map(([value, label]) => h("option", { value }, label)));

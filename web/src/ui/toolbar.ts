@@ -13,6 +13,7 @@ import {
   PencilRuler,
   Radius,
   Rotate3d,
+  MapPin,
   Ruler,
   Scale3d,
   Spline,
@@ -148,13 +149,34 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
         (e) => e.measured !== null,
       ),
       add(
+        iconButton(
+          MapPin,
+          "Place hotspots on the surface (Shift+H)",
+          () => actions.toggleHotspots(),
+          "place-hotspot",
+        ),
+        (e) => e.placesHotspot,
+      ),
+      add(
         iconButton(Axis3d, "Show or hide the cages (Shift+O)", () => actions.toggle("cages"), "cages"),
         (e) => e.cages,
       ),
     ),
   );
   app.store.watch(
-    ["hello", "tool", "selecting", "measured", "mode", "cage", "axes", "snap", "proportional", "cages"],
+    [
+      "hello",
+      "tool",
+      "selecting",
+      "measured",
+      "placesHotspot",
+      "mode",
+      "cage",
+      "axes",
+      "snap",
+      "proportional",
+      "cages",
+    ],
     (now) => {
       for (const element of editing) element.hidden = isReadOnly(now);
       for (const [button, on] of lit) button.classList.toggle("on", on(now));

@@ -4,6 +4,8 @@ import { readEdits } from "../field/page_edits";
 import { readEditsInWorker } from "../splats/edits_reader";
 import { readSplatEdits } from "../splats/splat_edits";
 import { SplatRenderer } from "../splats/splat_renderer";
+import { HotspotMarks } from "./hotspots";
+import { showScale } from "./scale_bar";
 import { takeBytes } from "./sources";
 import { SceneViewer } from "./viewer";
 import type { SceneHeader } from "./viewer";
@@ -18,6 +20,7 @@ interface ViewerApi {
   take: typeof takeBytes;
   /** The viewer of the page. */
   viewer?: SceneViewer;
+  hotspots?: HotspotMarks;
 }
 
 declare global {
@@ -56,6 +59,13 @@ async function start(header: SceneHeader): Promise<void> {
     compare.onclick = () => (viewer.edited = !viewer.edited);
     play.onclick = () => viewer.play(!viewer.plays);
     home.onclick = () => viewer.home();
+    const marks = connectHotspots(viewer, header);
+    const scaleBar = findElement(".scale");
+    viewer.onFrame = () => {
+      marks.arrange();
+      if (header.meters_per_unit !== undefined)
+        showScale(scaleBar, viewer.orbit, viewer.focal, header.meters_per_unit);
+    };
     setInterval(() => {
       play.hidden = !viewer.canPlay;
       play.textContent = viewer.plays ? "Stop" : "Play";
@@ -66,12 +76,32 @@ async function start(header: SceneHeader): Promise<void> {
       // A focused button handles the space key itself.
       if (key === " " && !(target instanceof HTMLButtonElement)) play.click();
       if (key === "h") home.click();
+      if (key === "ArrowRight") marks.step(1);
+      if (key === "ArrowLeft") marks.step(-1);
+      if (key === "Escape") marks.close();
     });
     await viewer.run();
   } catch (error) {
     bar.hidden = true;
     say(error instanceof Error ? error.message : String(error));
   }
+}
+
+/** Connects the marks, the card and the buttons of the tour. */
+function connectHotspots(viewer: SceneViewer, header: SceneHeader): HotspotMarks {
+  const card = findElement(".card");
+  const marks = new HotspotMarks(viewer, header.hotspots ?? [], findElement(".hotspots"), card);
+  window.cagefieldViewer.hotspots = marks;
+  for (const [selector, by] of [
+    [".previous", -1],
+    [".next", 1],
+  ] as const) {
+    const button = findElement(selector);
+    button.hidden = marks.hotspots.length === 0;
+    button.onclick = () => marks.step(by);
+  }
+  findElement(".close").onclick = () => marks.close();
+  return marks;
 }
 
 const description = document.getElementById("scene");

@@ -54,7 +54,11 @@ function decodeBase64(text: string): Bytes {
 
 /** The bytes of a file, as a stream. */
 export async function openFile(name: FileName, { url }: FileEntry): Promise<ReadableStream<Bytes>> {
-  if (url === undefined) return feedFor(name).stream;
+  return url === undefined ? feedFor(name).stream : await openBeside(url);
+}
+
+/** The bytes of a file beside the page, as a stream. */
+export async function openBeside(url: string): Promise<ReadableStream<Bytes>> {
   if (location.protocol === "file:")
     throw new Error(
       "A browser does not let a page read files beside it on a disk: serve the folder (python -m http.server), or export a single .html file.",

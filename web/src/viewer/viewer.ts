@@ -4,12 +4,16 @@
  */
 import { AdaptiveResolution, waitForGpu } from "../field/adaptive_resolution";
 import type { SceneDrawer } from "../field/scene_drawer";
+import type { Distances } from "../field/views";
 import { createDrawer, identifyScene, readMagic } from "../splats/drawer_selection";
 import { viewAt } from "./camera_path";
 import type { Path, View } from "./camera_path";
+import { poseBetween } from "./flight";
+import type { Pose } from "./flight";
+import type { Hotspot } from "./hotspots";
 import { Orbit } from "./orbit";
 import { PathEdits } from "./path_edits";
-import { openFile, readAll } from "./sources";
+import { openBeside, openFile, readAll } from "./sources";
 import type { FileEntry } from "./sources";
 import { SPLAT_PATH_MAGIC, SplatPath } from "./splat_path";
 import { listenForMoves } from "./touch_controls";
@@ -22,6 +26,12 @@ export interface SceneHeader {
   centre: Vec3;
   background: Vec3 | null;
   path: Path | null;
+  /** Points with text; absent without any. */
+  hotspots?: Hotspot[];
+  /** Scale of the scene; absent where it is unknown. */
+  meters_per_unit?: number;
+  /** Diagonal of the scene's box, world units. */
+  extent: number;
   /** `edits`: those of the scene. `path`: the edits along the camera path. */
   files: { field: FileEntry; edits?: FileEntry; path?: FileEntry };
 }
@@ -30,6 +40,10 @@ export interface SceneHeader {
 const SETTLE_MS = 120;
 const MAX_DEVICE_PIXEL_RATIO = 2;
 const MIN_FRAME_PIXELS = 8;
+
+/** Number of distances that are read back from an image with hotspots. */
+const DISTANCES = 10_000;
+const FLIGHT_MS = 2500;
 
 export class SceneViewer {
   /** The renderer of the scene's kind; null before the first bytes of the scene. */
@@ -43,9 +57,16 @@ export class SceneViewer {
   private nextRow: number | null = 0;
   /** Whether a moving frame of the current view has been shown: the complete frame is drawn only then. */
   private previewed = false;
+  /** Number of calls of `refresh`. */
+  private refreshes = 0;
   /** Number of frames shown. */
   pictures = 0;
   private playStart: number | null = null;
+  private flight: { from: Pose; to: Pose; begun: number; view: View; around: Vec3 } | null = null;
+  /** Distances of the last image, read where there are hotspots; null before it. */
+  distances: Distances | null = null;
+  /** Called before each of the browser's frames in which the view or the image may be another one. */
+  onFrame: (() => void) | null = null;
   /** The scene's edits; undefined while they are being loaded. */
   private edits: unknown = undefined;
   private showsEdits = true;
@@ -54,7 +75,7 @@ export class SceneViewer {
   canPlay = false;
 
   constructor(
-    private readonly canvas: HTMLCanvasElement,
+    readonly canvas: HTMLCanvasElement,
     private readonly header: SceneHeader,
     private readonly say: (text: string) => void,
     private readonly progressed: (share: number) => void = () => undefined,
@@ -97,6 +118,9 @@ export class SceneViewer {
     renderer.edited = this.showsEdits;
     let edits: Promise<void> | undefined;
     await renderer.load(source, {
+      openBeside,
+      onDetails: () => this.refresh(),
+      onCoarse: (nodes, of) => this.say(`The GPU has no room for the details of ${nodes} of ${of} parts.`),
       onArrival: (bytes) => this.progressed(Math.min(0.99, bytes / files.field.bytes)),
       onLevel: (number, count) => {
         this.say(number < count ? "Loading detail …" : "");
@@ -138,15 +162,47 @@ export class SceneViewer {
     return this.playStart !== null;
   }
 
+  /** Diagonal of the scene's box, world units. */
+  get extent(): number {
+    return this.header.extent;
+  }
+
+  /** Focal length in CSS pixels. */
+  get focal(): number {
+    return (0.5 * Math.min(this.canvas.clientWidth, this.canvas.clientHeight)) / this.halfTangent;
+  }
+
+  /** Whether the view flies to a hotspot. */
+  get flies(): boolean {
+    return this.flight !== null;
+  }
+
+  /** Flies to a view; then the orbit's center is the point of its axis closest to `around`. */
+  flyTo(view: View, around: Vec3): void {
+    this.playStart = null;
+    if (this.edits !== undefined) this.renderer?.setEdits(this.edits);
+    const end = new Orbit(view.c2w, this.header.up, around);
+    const { eye, target } = this.orbit;
+    this.flight = {
+      from: { eye, target, fov_y_deg: this.fov },
+      to: { eye: end.eye, target: end.target, fov_y_deg: view.fov_y_deg },
+      begun: matchMedia("(prefers-reduced-motion: reduce)").matches ? -Infinity : performance.now(),
+      view,
+      around,
+    };
+    this.invalidate();
+  }
+
   /** Plays the camera path from its start, or stops. */
   play(on: boolean): void {
     this.playStart = on && this.canPlay ? performance.now() : null;
+    this.flight = null;
     this.invalidate();
   }
 
   /** Shows the view in which the scene opens, with its complete edits. */
   home(): void {
-    this.playStart = null;
+    this.playStart = this.flight = null;
     if (this.edits !== undefined) this.renderer?.setEdits(this.edits);
     this.look(this.header.start);
   }
@@ -162,14 +218,14 @@ export class SceneViewer {
     return Math.tan((this.fov * Math.PI) / 360);
   }
 
-  private look(view: View): void {
-    this.orbit = new Orbit(view.c2w, this.header.up, this.header.centre);
+  private look(view: View, around = this.header.centre): void {
+    this.orbit = new Orbit(view.c2w, this.header.up, around);
     this.fov = view.fov_y_deg;
     this.invalidate();
   }
 
   private change(action: () => void): void {
-    this.playStart = null;
+    this.playStart = this.flight = null;
     action();
     this.invalidate();
   }
@@ -180,11 +236,18 @@ export class SceneViewer {
     this.previewed = false;
   }
 
+  /** Draws the complete frame once more; the one before stays until then. */
+  private refresh(): void {
+    this.refreshes++;
+    this.nextRow = 0;
+  }
+
   private async drawFrames(): Promise<void> {
     for (;;) {
       await new Promise((done) => requestAnimationFrame(done));
       try {
         this.advance();
+        this.onFrame?.();
         if (this.renderer !== null) await this.draw(this.renderer);
       } catch (error) {
         this.say(error instanceof Error ? error.message : String(error));
@@ -195,11 +258,26 @@ export class SceneViewer {
 
   /** Moves on along the camera path while it plays. */
   private advance(): void {
+    if (this.flight !== null) this.advanceFlight(this.flight);
     const { path } = this.header;
     if (this.playStart === null || !path) return;
     const time = (performance.now() - this.playStart) / 1000;
     this.seek(path, time);
     if (!path.loop && time >= path.seconds) this.playStart = null;
+  }
+
+  private advanceFlight({ from, to, begun, view, around }: NonNullable<SceneViewer["flight"]>): void {
+    const share = (performance.now() - begun) / FLIGHT_MS;
+    if (share >= 1) {
+      this.flight = null;
+      this.look(view, around);
+      return;
+    }
+    const { eye, target, fov_y_deg } = poseBetween(from, to, share, this.header.up);
+    this.orbit.eye = eye;
+    this.orbit.target = target;
+    this.fov = fov_y_deg;
+    this.invalidate();
   }
 
   /** Draws a moving frame after a change, and bands of the complete frame once the view is still. */
@@ -221,17 +299,19 @@ export class SceneViewer {
     const first = isStill ? this.nextRow : 0;
     const isBand = isStill && renderer.inBands;
     const count = isBand ? Math.min(resolution.bandRows(width, height), height - first) : down;
-    const { changedAt } = this;
+    const { changedAt, refreshes } = this;
     const sorted = performance.now() - changedAt > SETTLE_MS;
     if (!renderer.render({ rows: { first, count }, sorted })) return;
     const isComplete = first + count >= down;
     if (isComplete) {
       renderer.show(width, height);
+      if (this.header.hotspots) this.distances = renderer.distances(DISTANCES);
       this.pictures++;
     }
     resolution.record(across * count, await waitForGpu(gl));
     if (this.changedAt !== changedAt) return;
     this.previewed = true;
+    if (this.refreshes !== refreshes) return void (this.nextRow = 0);
     // Splats that were in an older depth order are drawn again.
     if (isStill) this.nextRow = !isComplete ? first + count : renderer.inOrder ? null : 0;
   }

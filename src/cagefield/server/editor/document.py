@@ -12,7 +12,9 @@ from cagefield.edits.grade import NEUTRAL_GRADE, Grade
 from cagefield.edits.operations import Operation
 from cagefield.edits.shells import SMOOTH_FLOW, Flow
 from cagefield.errors import EditError
+from cagefield.scene.hotspots import Hotspot
 from cagefield.selection.element_selection import Selection
+from cagefield.server.editor.hotspot_list import HotspotList, numbered
 
 COLOURS = ("#4cc2ff", "#ffb14c", "#7ee081", "#ff7eb6", "#c9a7ff", "#f4e04d", "#5ce0d0", "#ff8a66")
 """Colours of cage pairs."""
@@ -40,7 +42,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Document:
-    """The edits in order, the scene's opacity choice and scale, the camera path, and the selected elements.
+    """The edits in order, the scene's opacity choice and scale, the camera path, hotspots, selected elements.
 
     The selection is undone as edits are, all pages share it, and no file has it; None selects nothing.
     Elements in `removed` are deleted from the field; None deletes nothing.
@@ -53,6 +55,7 @@ class Document:
     selection: Selection | None = None
     removed: Selection | None = None
     meters_per_unit: float | None = None
+    hotspots: HotspotList = ()
 
     @classmethod
     def from_edits(
@@ -64,9 +67,10 @@ class Document:
         loop: bool = False,
         removed: Selection | None = None,
         meters_per_unit: float | None = None,
+        hotspots: Iterable[Hotspot] = (),
     ) -> Document:
-        """The document of an edit stack, its edits numbered from 1."""
-        document = cls((), preserve_opacity, keys, loop, None, removed, meters_per_unit)
+        """The document of an edit stack, its edits and hotspots numbered from 1."""
+        document = cls((), preserve_opacity, keys, loop, None, removed, meters_per_unit, numbered(hotspots))
         for number, edit in enumerate(edits, start=1):
             document = document.insert(Entry(number, edit, document.next_colour))
         return document

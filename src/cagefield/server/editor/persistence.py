@@ -16,23 +16,23 @@ from pathlib import Path
 
 from cagefield.cameras.keyframe_files import dump_path, load_keys
 from cagefield.cameras.keyframes import Keyframe
-from cagefield.edits import Edit, EditStack, parse_edits
-from cagefield.edits.edit_files import MAX_EDITS, VERSION, save_edits
-from cagefield.errors import CagefieldError, SceneError
+from cagefield.edits import Edit, EditStack
+from cagefield.edits.edit_files import MAX_EDITS, save_edits
+from cagefield.errors import SceneError
 from cagefield.fields.splat_field import SplatField
 from cagefield.files import json_text
 from cagefield.files.atomic import replaced_file
 from cagefield.files.safe_open import FileState, read_bytes, read_text, real_path
 from cagefield.files.stale_files import remove_leftovers, remove_unfinished
 from cagefield.files.temporary_folders import remove_abandoned
-from cagefield.scene.alignment import Alignment
 from cagefield.scene.removed_elements import Removal, dump_removed, read_removed
 from cagefield.scene.scene import Scene
-from cagefield.scene.scene_files import FIELD, REMOVED, field_states
-from cagefield.selection.selection_files import dump_selection, parse_selection
+from cagefield.scene.scene_files import FIELD, MANIFEST, REMOVED, field_states
+from cagefield.server.editor.autosave_content import autosave_content, parse_autosave
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.edit_texts import ReadEdits, file_values
 from cagefield.server.editor.identity_cache import IdentityCache
+from cagefield.server.editor.manifest_merge import ManifestValues, manifest_on_disk, values_of_document
 from cagefield.server.editor.pasted_sources import absolute, admitted, source_in, sources_under, written
 from cagefield.server.editor.scene_lock import SceneLock
 from cagefield.server.editor.session import Session
@@ -76,10 +76,13 @@ class SceneStore:
         self.damaged: str | None = None
         """Report of an unreadable autosave, or None."""
         self._written = self._fingerprint()
+        self._manifest = self._opened_values()
+        """The manifest's values as this editor read or wrote them last."""
         self.files = field_states(path) if files is None else files
         """The states that the files of the scene, as it is edited here, have in the folder that has it."""
         self._field = self.files[0]
         self._warned: object = None
+        self._warned_manifest: object = None
         self._kept: Document | None = None
         self._values: IdentityCache[Edit, object] = IdentityCache(4 * MAX_EDITS)
         """Edit-file values of the edits written last."""
@@ -99,6 +102,7 @@ class SceneStore:
             loop=loop,
             removed=read_removed(self.path if self.source is None else self.origin),
             meters_per_unit=self.scene.alignment.meters_per_unit,
+            hotspots=self.scene.hotspots,
         )
 
     def recovered(self) -> Document | None:
@@ -108,7 +112,7 @@ class SceneStore:
         """
         try:
             content = json_text.loads(read_text(self.autosave_path))
-            document = _parsed(content)
+            document = parse_autosave(content)
         except FileNotFoundError:
             return None
         except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
@@ -130,6 +134,10 @@ class SceneStore:
         names = (".damaged", *(f".damaged-{n}" for n in range(2, MAX_DAMAGED_AUTOSAVES + 1)))
         paths = [self.autosave_path.with_suffix(name) for name in names]
         return next((path for path in paths if not path.exists()), paths[-1])
+
+    def _opened_values(self) -> ManifestValues:
+        scene = self.scene
+        return ManifestValues(scene.preserve_opacity, scene.alignment.meters_per_unit, scene.hotspots)
 
     @property
     def shown_path(self) -> Path:
@@ -205,7 +213,7 @@ class SceneStore:
             if session.saved:
                 self.autosave_path.unlink(missing_ok=True)
             else:
-                content = _content(document, self._values_of(document))
+                content = autosave_content(document, self._values_of(document))
                 with replaced_file(self.autosave_path) as draft:
                     draft.write_text(json.dumps(content), encoding="utf-8")
             self.trouble = None
@@ -247,6 +255,7 @@ class SceneStore:
             raise SceneError(
                 f"{self.path / _EDITS} was changed by another program; save again to replace it, or Save as"
             )
+        self._merge_manifest(session)
         document = session.document
         camera_path = dump_path(document.placed_keys, loop=document.loop)
         with contextlib.ExitStack() as drafts:  # there is room for all files, or none changes
@@ -260,6 +269,24 @@ class SceneStore:
             save_edits(self.written(document.stack), self.path / _EDITS)
             self._written = self._fingerprint()  # ours, should the rest not be possible
         self._done(session)
+
+    def _merge_manifest(self, session: Session) -> None:
+        """Take what another program wrote into the manifest meanwhile.
+
+        Raises SceneError, once, where the editor has changed the same values; saving again replaces them.
+        """
+        found = manifest_on_disk(self.path)
+        if found is None:
+            return
+        disk, alignment = found
+        self.scene = dataclasses.replace(self.scene, alignment=alignment)
+        conflicts = session.take_manifest(self._manifest, disk)
+        if conflicts and self._warned_manifest != disk:
+            self._warned_manifest = disk
+            raise SceneError(
+                f"{self.path / MANIFEST} was changed by another program, and so were "
+                f"{' and '.join(conflicts)} here; save again to replace what is there, or Save as"
+            )
 
     def save_as(self, session: Session, path: str, overwrite: bool) -> None:
         """Writes the scene with its edits as another folder, which is the open scene from then on.
@@ -299,6 +326,7 @@ class SceneStore:
 
     def _done(self, session: Session) -> None:
         session.mark_saved()
+        self._manifest = values_of_document(session.document)
         self._written, self._field, self._warned = self._fingerprint(), field_states(self.path)[0], None
         self._kept = None
         self.autosave(session)
@@ -317,6 +345,7 @@ class SceneStore:
             folder=folder,
             removal=removal,
             alignment=dataclasses.replace(self.scene.alignment, meters_per_unit=document.meters_per_unit),
+            hotspots=tuple(entry.hotspot for entry in document.hotspots),
         )
 
     def _fingerprint(self) -> str:
@@ -329,57 +358,3 @@ class SceneStore:
 def stem_of(file: Path) -> str:
     """The name of a splat file without its suffix, .compressed.ply included."""
     return file.name.removesuffix(file.suffix).removesuffix(".compressed") or file.name
-
-
-def _content(document: Document, edits: list[object]) -> dict[str, object]:
-    return {
-        "version": 1,
-        "edits": {"version": VERSION, "edits": edits},
-        "locked": [entry.locked for entry in document.entries],
-        "preserve_opacity": document.preserve_opacity,
-        "meters_per_unit": document.meters_per_unit,
-        "loop": document.loop,
-        "removed": None if document.removed is None else dump_selection(document.removed),
-        "keys": [
-            {
-                "c2w": list(key.c2w),
-                "fov_y_deg": key.fov_y_deg,
-                "seconds": key.seconds,
-                "parts": {str(name): part for name, part in key.parts.items()},
-            }
-            for key in document.placed_keys
-        ],
-    }
-
-
-def _parsed(content: dict[str, object]) -> Document:
-    """The document of an autosave. Raises ValueError and its like for anything else."""
-    if content["version"] != 1:
-        raise CagefieldError("an autosave of another version")
-    stack = parse_edits(
-        json.dumps(content["edits"]), format="json", source="autosave", check=False, mend=True
-    )
-    keys = tuple(
-        Keyframe(
-            tuple(key["c2w"]),
-            key["fov_y_deg"],
-            key["seconds"],
-            {int(name): part for name, part in key["parts"].items()},
-        )
-        for key in content["keys"]  # type: ignore[attr-defined]
-    )
-    removed = content.get("removed")
-    document = Document.from_edits(
-        stack,
-        preserve_opacity=bool(content["preserve_opacity"]),
-        keys=keys,
-        loop=bool(content["loop"]),
-        removed=None if removed is None else parse_selection(removed),
-        meters_per_unit=Alignment(content.get("meters_per_unit")).meters_per_unit,  # type: ignore[arg-type]
-    )
-    locked = content["locked"]
-    entries = tuple(
-        dataclasses.replace(entry, locked=bool(flag))
-        for entry, flag in zip(document.entries, locked, strict=True)  # type: ignore[call-overload]
-    )
-    return dataclasses.replace(document, entries=entries)

@@ -16,8 +16,10 @@ from cagefield.edits.operations import Operation
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
 from cagefield.geometry.mesh_cage import MeshCage
+from cagefield.scene.hotspots import Hotspot
 from cagefield.selection.element_selection import Mode, Selection
 from cagefield.selection.selection_cages import outer_cage_of_shape
+from cagefield.server.editor import hotspot_list
 from cagefield.server.editor.cage_placement import cage_pair_around, outer_cage_around
 from cagefield.server.editor.chain_edits import renamed, with_own_names, with_parent, without
 from cagefield.server.editor.document import Document
@@ -25,6 +27,7 @@ from cagefield.server.editor.drag_solver import Moved, Target, move
 from cagefield.server.editor.edit_kinds import Kind, with_kind, with_options, with_outer, with_shell
 from cagefield.server.editor.edit_texts import ReadEdits, edits_in
 from cagefield.server.editor.labels import edit_label, fresh_name, option_word, suffix_for
+from cagefield.server.editor.manifest_merge import ManifestValues, merged
 from cagefield.server.editor.mirror import mirror_edit
 from cagefield.server.editor.pasting import crop_paste
 from cagefield.server.editor.point_edits import edit_of_mesh, edit_of_point, subdivided, with_reach
@@ -216,6 +219,30 @@ class Session(SessionState):
         if meters_per_unit != self.document.meters_per_unit:
             self._push("Scale in meters", replace(self.document, meters_per_unit=meters_per_unit))
 
+    def put_hotspot(self, number: int | None, hotspot: Hotspot) -> int:
+        """The number of a hotspot: a new one for None, else the one of that number, changed."""
+        entries = self.document.hotspots
+        if number is None:
+            number = self._next_hotspot
+            self._next_hotspot += 1
+            label, entries = "Place hotspot", hotspot_list.added(entries, number, hotspot)
+        else:
+            label, entries = "Change hotspot", hotspot_list.changed(entries, number, hotspot)
+        self._push_hotspots(f'{label} "{hotspot.title:.60}"', entries)
+        return number
+
+    def remove_hotspot(self, number: int) -> None:
+        """A hotspot goes."""
+        self._push_hotspots("Remove hotspot", hotspot_list.removed(self.document.hotspots, number))
+
+    def move_hotspot(self, number: int, to: int) -> None:
+        """A hotspot goes to another place in the list, 0 first."""
+        self._push_hotspots("Reorder hotspots", hotspot_list.moved(self.document.hotspots, number, to))
+
+    def _push_hotspots(self, label: str, entries: hotspot_list.HotspotList) -> None:
+        if entries != self.document.hotspots:
+            self._push(label, replace(self.document, hotspots=entries))
+
     def select(self, number: int | None) -> None:
         """Select an edit on all pages; no entry of the history."""
         if number is not None:
@@ -295,8 +322,20 @@ class Session(SessionState):
         if document != self.document:
             self._push("Camera path", document)
 
+    def take_manifest(self, before: ManifestValues, disk: ManifestValues) -> list[str]:
+        """Values of the manifest that another program alone changed, as one entry; words for conflicts.
+
+        `before` are the values that both began with, `disk` those of the file.
+        """
+        document, conflicts = merged(self.document, before, disk, self._next_hotspot)
+        if document != self.document:
+            self._next_hotspot = hotspot_list.next_number(document.hotspots)
+            self._push("Changed by another program", document)
+        return conflicts
+
     def restore(self, document: Document) -> None:
         """Changes that were not saved before a crash, as one entry."""
         self._next = max([self._next, *(entry.id + 1 for entry in document.entries)])
+        self._next_hotspot = max(self._next_hotspot, hotspot_list.next_number(document.hotspots))
         self._push("Restore unsaved changes", document)
         self.selected = document.entries[-1].id if document.entries else None

@@ -17,6 +17,7 @@ from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
 from cagefield.geometry.detour_grid import DetourGrid
 from cagefield.selection.element_selection import Selection
+from cagefield.server.editor import hotspot_list
 from cagefield.server.editor.active_drags import Drags
 from cagefield.server.editor.chain_edits import Carriers, descendants
 from cagefield.server.editor.connected_edits import ConnectedEdits, Wanted, is_unprepared
@@ -58,6 +59,7 @@ class SessionState:
         self.revision = 1
         self._saved: Document | None = document
         self._next = max((entry.id for entry in document.entries), default=0) + 1
+        self._next_hotspot = hotspot_list.next_number(document.hotspots)
         self._problems: IdentityCache[Edit, str | None] = IdentityCache(4 * MAX_EDITS)
         self._connected = ConnectedEdits()
         self._carriers = Carriers(self.problem, self._connected.resolved)

@@ -28,6 +28,7 @@ from cagefield.server.protocol.common import (
     Text,
     View,
 )
+from cagefield.server.protocol.hotspot_messages import HotspotMessage
 from cagefield.server.protocol.operation_messages import OperationMessage
 from cagefield.server.protocol.point_messages import PointMessage
 from cagefield.server.protocol.selection_messages import AttributeName, SelectionMessage
@@ -316,7 +317,7 @@ PageMessage: TypeAlias = Annotated[
     CameraMessage | DisplayMessage | PresentedMessage | Drawing | DragBegin | DragMove | DragEnd | DragCancel
     | PlayBegin | Play | PlayEnd | Apply | SetCage | Place | PasteScene | FitInner | OuterMargin | Change
     | SceneChange | ScaleChange | Command | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath
-    | RenderJob | ExportSplats | CancelJob | SelectionMessage | PointMessage,
+    | RenderJob | ExportSplats | CancelJob | SelectionMessage | PointMessage | HotspotMessage,
     Field(discriminator="type"),
 ]  # fmt: skip
 

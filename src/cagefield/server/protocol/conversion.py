@@ -24,10 +24,12 @@ from cagefield.selection.element_selection import Selection
 from cagefield.server.editor.document import Entry
 from cagefield.server.editor.drag_solver import Moved, move_corners
 from cagefield.server.editor.edit_kinds import kind_of
+from cagefield.server.editor.hotspot_list import HotspotEntry
 from cagefield.server.editor.pasting import cage_in_scene
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import client_messages, common, operation_messages, server_messages
 from cagefield.server.protocol.common import Corners, Vec3
+from cagefield.server.protocol.hotspot_messages import HotspotCamera
 from cagefield.typing import Array
 
 STILLS_PER_SECOND, MOST_STILLS = 30.0, 6000
@@ -222,9 +224,18 @@ def state_of(
             for key in document.keys
         ],
         loop=document.loop,
+        hotspots=[_hotspot_state(entry) for entry in document.hotspots],
         selection=_count_of(document.selection),
         removed=_count_of(document.removed),
         isolated=session.isolated is not None,
+    )
+
+
+def _hotspot_state(entry: HotspotEntry) -> server_messages.HotspotState:
+    hotspot, view = entry.hotspot, entry.hotspot.view
+    camera = None if view is None else HotspotCamera(c2w=list(view.c2w), fov_y_deg=view.fov_y_deg)
+    return server_messages.HotspotState(
+        id=entry.id, title=hotspot.title, text=hotspot.text, position=hotspot.position, camera=camera
     )
 
 

@@ -63,7 +63,14 @@ def _plain(part: Any) -> Any:
         return [_plain(item) for item in part]
     if not isinstance(part, dict):
         return part
-    out = {key: _plain(value) for key, value in part.items() if key not in ("title", "discriminator")}
+    # A member of a message may be called "title", too.
+    out = {
+        key: {name: _plain(member) for name, member in value.items()}
+        if key == "properties"
+        else _plain(value)
+        for key, value in part.items()
+        if key not in ("title", "discriminator")
+    }
     if "prefixItems" in out:
         items = out.pop("prefixItems")
         numbers = all(item.get("type") == "number" for item in items)

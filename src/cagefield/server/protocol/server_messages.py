@@ -27,6 +27,7 @@ from cagefield.server.protocol.common import (
     Vec3,
     View,
 )
+from cagefield.server.protocol.hotspot_messages import HotspotCamera, HotspotId
 
 
 class Hello(Message):
@@ -118,6 +119,16 @@ class SelectionCount(Message):
     total: int
 
 
+class HotspotState(Message):
+    """A hotspot: its number, texts, position in deformed space, and the camera to look from, if any."""
+
+    id: HotspotId
+    title: str
+    text: str
+    position: Vec3
+    camera: HotspotCamera | None
+
+
 class State(Message):
     """Everything that pages show of the edits; sent to all pages after each change."""
 
@@ -140,6 +151,7 @@ class State(Message):
     meters_per_unit: float | None
     keys: list[Key]
     loop: bool
+    hotspots: list[HotspotState]
     selection: SelectionCount | None
     """Selected elements of the field; None for none."""
     removed: SelectionCount | None

@@ -18,6 +18,7 @@ from cagefield.server.editor.session import Session
 from cagefield.server.protocol import (
     client_messages,
     common,
+    hotspot_messages,
     point_messages,
     selection_messages,
     server_messages,
@@ -42,6 +43,7 @@ from cagefield.server.render_worker.tasks import (
     values_of,
 )
 from cagefield.server.render_worker.view import Display
+from cagefield.server.web.hotspot_handlers import change_hotspots
 from cagefield.server.web.point_handlers import PointChange, change_points
 from cagefield.server.web.selection_handlers import change_selection, histogram_of
 from cagefield.server.web.worker_threads import run_in_thread
@@ -337,6 +339,12 @@ class MessageHandlers:
     @_handles(client_messages.ScaleChange)
     def _scale_change(self, message: client_messages.ScaleChange) -> None:
         self._session.set_scale(message.meters_per_unit)
+        self._coordinator.changed()
+
+    @_handles(hotspot_messages.PutHotspot)
+    @_handles(hotspot_messages.MoveHotspot)
+    def _change_hotspots(self, message: hotspot_messages.HotspotMessage) -> None:
+        change_hotspots(self._session, message)
         self._coordinator.changed()
 
     @_handles(client_messages.Command)
