@@ -38,7 +38,7 @@ EDITS = {
     "corner out": Edit.continuous(BOX, OUTER).move_corner(7, (0.3, 0.3, 0.3)),
     "corner in": Edit.continuous(BOX, OUTER).move_corner(7, (-0.16, -0.16, -0.16)),
     "shear": Edit.continuous(BOX, OUTER).shear(xy=0.6, zx=-0.4),
-    "off centre, turn 90": Edit.continuous(ASIDE, OUTER).rotate((0, 0, 1.57)),
+    "off center, turn 90": Edit.continuous(ASIDE, OUTER).rotate((0, 0, 1.57)),
     "bent cages": Edit.continuous(BENT, BENT_OUTER).rotate((1.0, 0.5, 1.0)).scale((0.9, 0.8, 1.0)),
     "turn in a slot": Edit.continuous(
         Cage.box((0, 0, 0), (1.2, 0.3, 0.3)), Cage.box((0, 0, 0), (1.6, 0.8, 0.8))

@@ -44,7 +44,7 @@ WHOLE: tuple[tuple[str, Factors], ...] = tuple(
     for name in ("digger", "chair", "microphone", "plant")
     for factors in ((0.5, 0.5, 0.5), (0.7, 0.7, 0.7), (1.0, 1.0, 0.5), (1.15, 1.15, 1.15))
 )
-"""Scene, factors along the world's axes: all of it is scaled about its centre."""
+"""Scene, factors along the world's axes: all of it is scaled about its center."""
 
 STANDING: tuple[tuple[str, str, str, Factors], ...] = (
     ("digger", "move_cone", "cone", (0.6, 0.6, 0.6)),
@@ -148,7 +148,7 @@ def _scaled(
     cameras = bench.scene(name).cameras["test"][:views]
     model = procedural_scene(name)
     moved = model.move(parts, scale=factors, pivot=pivot).with_modeled_light()
-    # The edit scales about the cage's centre; what remains takes that to where scaling about the pivot does.
+    # The edit scales about the cage's center; what remains takes that to where scaling about the pivot does.
     shift = (1.0 - np.array(factors)) * (pivot - cage.center)
     edit = Edit.move(cage).scale(factors).translate(shift)
     truth = np.stack([moved.photograph(camera, background="white").rgb8() for camera in cameras])

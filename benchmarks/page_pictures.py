@@ -170,7 +170,7 @@ class PagePictures:
 
 
 def alike(ours: RenderResult, drawn: Any) -> list[float]:
-    """PSNR of colour, opacity, depth and normals."""
+    """PSNR of color, opacity, depth and normals."""
     assert ours.normals is not None
     solid = (ours.opacity > 0.5) & np.isfinite(drawn.depth)
     far = float(ours.depth[solid].max())

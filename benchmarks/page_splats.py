@@ -1,4 +1,4 @@
-"""Compares pictures of splats that a page draws with its own GPU with the rasteriser's, and counts bytes.
+"""Compares pictures of splats that a page draws with its own GPU with the rasterizer's, and counts bytes.
 
 python -m benchmarks.page_splats FILE... [-o benchmarks/results/page_splats.md] [--pictures FOLDER]
 
@@ -50,7 +50,7 @@ class PageSplats:
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """File to write the table to, as well."""
     pictures: Path | None = None
-    """Folder for pictures: the rasteriser's, the page's, and 10 times their difference."""
+    """Folder for pictures: the rasterizer's, the page's, and 10 times their difference."""
     width: int = 800
     """Width of the pictures that are compared; their height is 3/4 of it."""
 
@@ -64,7 +64,7 @@ class PageSplats:
                     print(line, flush=True)
         notes = (
             f"- rgb, opacity, depth, normals: PSNR in dB at {self.width}x{self.width * 3 // 4}, of depth and "
-            "normals where opacity is above a half. Half floats for colour, floats for depth.",
+            "normals where opacity is above a half. Half floats for color, floats for depth.",
             "- Changed: splats that come with the edit, children of split ones too. Upload: the edits' file.",
             f"- {cpu_model()}. `python -m benchmarks.page_splats FILE...`",
         )

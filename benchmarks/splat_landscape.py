@@ -17,7 +17,7 @@ FLAT = 0.1
 def landscape(count: int, degree: int = 0, seed: int = 0) -> SplatField:
     """Flat splats on hills of 20 x 20 with boulders on them, each about as wide as its share of the surface.
 
-    Colours vary smoothly, with a tenth of noise; where `degree` is above 0, a little with the direction.
+    Colors vary smoothly, with a tenth of noise; where `degree` is above 0, a little with the direction.
     """
     chance = np.random.default_rng(seed)
     rocks = np.column_stack([chance.uniform(-9.5, 9.5, (BOULDERS, 2)), chance.uniform(0.1, 0.5, BOULDERS)])

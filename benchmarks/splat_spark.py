@@ -1,4 +1,4 @@
-"""Pictures of splat files by this rasteriser, by its oracle, and by Spark in a browser.
+"""Pictures of splat files by this rasterizer, by its oracle, and by Spark in a browser.
 
     mkdir spark && cd spark && npm install @sparkjsdev/spark@2.2.0 three@0.180
     python -m benchmarks.splat_spark FILE_OR_FOLDER... --modules spark/node_modules [--formats FILE]
@@ -80,7 +80,7 @@ CHOICES = {
     "splats end at sqrt(8) sigmas, alpha 1/510": ("maxStdDev", "minAlpha"),
     "order by distance": ("sortRadial",),
     "packed splats": ("accumExtSplats",),
-    "centres beyond 1.4 of the picture are left out, splats end at 512 pixels": ("clipXY", "maxPixelRadius"),
+    "centers beyond 1.4 of the picture are left out, splats end at 512 pixels": ("clipXY", "maxPixelRadius"),
     "all (as it is)": (),
 }
 Options = dict[str, float | bool]
@@ -90,7 +90,7 @@ def alike(field: SplatField) -> Options:
     """Spark's options with which it draws what we do.
 
     Its own are the antialiased filter whatever the file says, splats that end at sqrt(8) sigmas, an order by
-    distance, and splats packed into 16 bytes (8 bits a scale, colours cut to [0, 1]); 3DGS' renderer, and
+    distance, and splats packed into 16 bytes (8 bits a scale, colors cut to [0, 1]); 3DGS' renderer, and
     ours, have the filter that the file was trained with, splats that end where alpha is 1/255, an order by
     depth, and floats.
     """

@@ -4,7 +4,7 @@
     python -m benchmarks.splat_speed --landscape 10000000 [--out benchmarks/results/splat_millions.md]
     python -m benchmarks.splat_speed --edits 1000000 [--out benchmarks/results/splat_edits_speed.md]
 
-Frames are colour, opacity and depth of a PLY file's splats seen from its turntable, or, without one, of
+Frames are color, opacity and depth of a PLY file's splats seen from its turntable, or, without one, of
 random
 splats. A training step is everything that a photo costs: splats drawn, gradients and curvatures, the step.
 Times are the least of the rounds, by the wall; kernels are compiled before.

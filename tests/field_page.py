@@ -22,7 +22,7 @@ VIEWER = Path(cagefield.__file__).parent / "pages" / "viewer" / "viewer.js"
 
 @dataclass(frozen=True)
 class Drawn:
-    """A picture of the page: colour [h,w,3] and opacity [h,w] in [0,1], depth [h,w], unit normals [h,w,3]."""
+    """A picture of the page: color [h,w,3] and opacity [h,w] in [0,1], depth [h,w], unit normals [h,w,3]."""
 
     rgb: NDArray[np.float64]
     opacity: NDArray[np.float64]

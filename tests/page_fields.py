@@ -1,4 +1,4 @@
-"""Fields and scenes for tests of the page's renderer: lumps of random density and colour."""
+"""Fields and scenes for tests of the page's renderer: lumps of random density and color."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOVE = Edit.move(Cage.box((0.6, 0.5, 0.3), (1.0, 0.9, 0.9))).translate((0.0, -0.
 def lumps(
     degree: int, contracted: bool, resolution: tuple[int, int, int] = (41, 36, 33), seed: int = 0
 ) -> VoxelField:
-    """A field of random lumps with smooth surfaces and colours; a contracted one also far from its box."""
+    """A field of random lumps with smooth surfaces and colors; a contracted one also far from its box."""
     rng = np.random.default_rng(degree + 10 * contracted + seed)
     K = (degree + 1) ** 2
     noise = ndimage.gaussian_filter(rng.standard_normal(resolution), 2.5)
@@ -41,7 +41,7 @@ def lumps(
 
 
 def lumps_scene() -> Scene:
-    """Lumps with one moved, grey behind them."""
+    """Lumps with one moved, gray behind them."""
     cameras = turntable((0, 0, 0), 3.2, 3, elevation=0.4, width=SIZE, height=SIZE, fov_x=0.8)
     return Scene(
         lumps(1, False),

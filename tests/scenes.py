@@ -1,4 +1,4 @@
-"""Small scenes for tests: a ball of constant density and colour, sampled on a voxel grid."""
+"""Small scenes for tests: a ball of constant density and color, sampled on a voxel grid."""
 
 from __future__ import annotations
 

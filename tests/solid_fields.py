@@ -1,4 +1,4 @@
-"""Fields of what is solid and coloured on a grid, and how alike two pictures are."""
+"""Fields of what is solid and colored on a grid, and how alike two pictures are."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from cagefield.fields.voxel_field import VoxelField
 
 
 def solid_field(solid: NDArray[np.bool_], rgb: NDArray[np.floating], scale: float = 1.0) -> VoxelField:
-    """A field over the cube from -scale to scale: opaque where it is solid [N,N,N], in colours [N,N,N,3].
+    """A field over the cube from -scale to scale: opaque where it is solid [N,N,N], in colors [N,N,N,3].
 
-    As in a trained field, the empty vertices beside a surface have its colours.
+    As in a trained field, the empty vertices beside a surface have its colors.
     """
     away, nearest = ndimage.distance_transform_edt(~solid, return_indices=True)
     vertices = np.flatnonzero(away < 2.0)

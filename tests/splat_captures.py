@@ -20,7 +20,7 @@ BOX = np.array([[-1.0] * 3, [1.0] * 3])
 
 
 def painted_ball(count: int = 250) -> SplatField:
-    """A ball of splats of random colours."""
+    """A ball of splats of random colors."""
     ball = ball_of_splats(count)
     colors = np.random.default_rng(5).uniform(0.05, 0.95, (count, 1, 3))
     return SplatField(
@@ -75,7 +75,7 @@ def as_dataset(
 
 
 def points_near(field: SplatField, far: float = 0.03, count: int = 120) -> SparsePoints:
-    """Grey points at some of the field's splats, each off by about `far` along each axis."""
+    """Gray points at some of the field's splats, each off by about `far` along each axis."""
     chance = np.random.default_rng(2)
     means = field.means[:: max(1, len(field) // count)]
     return SparsePoints(means + far * chance.normal(size=means.shape), np.full(means.shape, 128, np.uint8))

@@ -103,12 +103,12 @@ def settled(values: Values, view: Camera, antialiased: bool) -> Values:
     raise AssertionError("no such parameters found")
 
 
-PARTS = {"means": (0, 3), "log_scales": (3, 3), "quaternions": (6, 3), "logits": (9, 1), "colour": (10, 3)}
+PARTS = {"means": (0, 3), "log_scales": (3, 3), "quaternions": (6, 3), "logits": (9, 1), "color": (10, 3)}
 """Where each parameter's gradient lies, and how many numbers it has."""
 
 
 def moved(values: Values, name: str, splat: int, axis: int, step: float) -> Values:
-    """The parameters with one of them changed; "quaternions" by a turn, "colour" by its constant harmonic."""
+    """The parameters with one of them changed; "quaternions" by a turn, "color" by its constant harmonic."""
     values = {key: part.copy() for key, part in values.items()}
     if name == "quaternions":
         w, v = values[name][splat, 0], values[name][splat, 1:]
@@ -116,7 +116,7 @@ def moved(values: Values, name: str, splat: int, axis: int, step: float) -> Valu
         # q (1, half): a turn about the splat's own axis.
         turned = np.concatenate([[w - v @ half], v + w * half + np.cross(v, half)])
         values[name][splat] = unit(turned)
-    elif name == "colour":
+    elif name == "color":
         values["sh"][splat, 0, axis] += step / harmonics.C0
     elif name == "logits":
         values[name][splat] += step
@@ -138,7 +138,7 @@ def scene(view: Camera, antialiased: bool, degree: int, seed: int) -> tuple[Valu
     """Random parameters, a target [H,W,3] and a background [3]."""
     chance = np.random.default_rng(seed)
     values = parameters(9, degree, seed)
-    # One opaque enough for ALPHA_MAX to hold, one beyond the edge whose shape no longer follows, one colour
+    # One opaque enough for ALPHA_MAX to hold, one beyond the edge whose shape no longer follows, one color
     # that is clamped at 0, one far smaller than a pixel.
     values["logits"][0] = 6.0
     right = view.c2w[:3, 0]

@@ -25,7 +25,7 @@ def cage() -> Cage:
 
 
 def room(box: bool, scale: float = 1.0, by: tuple[float, float] = (0.0, 0.0)) -> SplatField:
-    """A coloured floor of flat splats, and a box on it, each shaded by how near the other is.
+    """A colored floor of flat splats, and a box on it, each shaded by how near the other is.
 
     Under the box, which no photo would show, the floor is black.
     """

@@ -11,7 +11,7 @@ from scenes import SH_C0
 
 
 def random_splats(count: int = 40, degree: int = 2, seed: int = 0) -> SplatField:
-    """Splats of all shapes, opacities and colours in the box [-1, 1]^3."""
+    """Splats of all shapes, opacities and colors in the box [-1, 1]^3."""
     chance = np.random.default_rng(seed)
     sh = chance.normal(size=(count, (degree + 1) ** 2, 3)) * 0.2
     return SplatField(
@@ -47,7 +47,7 @@ BALL_RADIUS = 0.25
 
 
 def ball_and_floor() -> SplatField:
-    """A red ball of radius .25 around the origin, over a grey floor at z = -.5."""
+    """A red ball of radius .25 around the origin, over a gray floor at z = -.5."""
     ball = ball_of_splats(800, BALL_RADIUS)
     axis = np.linspace(-0.9, 0.9, 24)
     x, y = (values.reshape(-1) for values in np.meshgrid(axis, axis))

@@ -1,4 +1,4 @@
-"""Splats and cameras that try a rasteriser: all lenses, all shapes, in float64 for the oracle."""
+"""Splats and cameras that try a rasterizer: all lenses, all shapes, in float64 for the oracle."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LENSES = {
 
 
 def camera(lens: str = "pinhole", width: int = 75, height: int = 50) -> Camera:
-    """A camera 4 units from the origin with the centre of its lens off that of its picture."""
+    """A camera 4 units from the origin with the center of its lens off that of its picture."""
     plain = Camera.look_at((2.5, -3.0, 1.0), (0, 0, 0), width=width, height=height, fov_x=0.9)
     center = (0.42 * width, 0.56 * height)
     return replace(plain, fy=1.1 * plain.fy, cx=center[0], cy=center[1], model=lens, distortion=LENSES[lens])

@@ -47,7 +47,7 @@ def test_ray_inside_a_face_and_ray_past_the_box():
     np.testing.assert_allclose(box.optical_depth(origins, [1.0, 0.0, 0.0]), [6.0, 0.0, 3.0])
 
 
-def test_sigma_adds_up_and_colour_is_the_weighted_mean():
+def test_sigma_adds_up_and_color_is_the_weighted_mean():
     field = AnalyticField([BOX, SPHERE])
     both, only_box, neither = (0.1, 0.0, 0.1), (0.45, -0.4, 0.7), (3.0, 3.0, 3.0)
     sigma, rgb = field(np.array([both, only_box, neither], np.float32), np.zeros((3, 3), np.float32))

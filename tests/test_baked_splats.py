@@ -39,7 +39,7 @@ def test_pictures_are_those_of_the_edits(stack: list[Edit], preserve: bool) -> N
     for camera in turntable((0, 0, 0), 4.0, 3, elevation=0.4, width=64, height=64, fov_x=0.8):
         a, b = edited.render(camera), baked.render(camera)
         assert a is not None and b is not None
-        # The rasteriser's own pictures are within 50 dB of its reference.
+        # The rasterizer's own pictures are within 50 dB of its reference.
         assert psnr(a.rgb, b.rgb) > 50.0
 
 
@@ -59,7 +59,7 @@ def test_splats_beyond_the_edits_are_the_fields_own() -> None:
     assert baked_splats(field, EditStack()) is field
 
 
-def test_a_rotation_turns_axes_and_colours_and_keeps_scales() -> None:
+def test_a_rotation_turns_axes_and_colors_and_keeps_scales() -> None:
     field = random_splats(100, degree=3)
     whole = Cage.box((0, 0, 0), 10.0)
     turn = Rotation.from_euler("xyz", (0.3, -0.7, 1.1)).as_matrix()

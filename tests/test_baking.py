@@ -1,4 +1,4 @@
-"""Baking a field into voxels: densities, colours, what is stored, what is refused."""
+"""Baking a field into voxels: densities, colors, what is stored, what is refused."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TILT = np.array([0.2, -0.1, 0.15])
 
 
 class Tilted:
-    """A blob of density whose colour is linear in the view direction: SH of degree 1, exactly."""
+    """A blob of density whose color is linear in the view direction: SH of degree 1, exactly."""
 
     bounds = np.array([[-1.0, -1.0, -0.5], [1.0, 1.0, 0.5]])
 
@@ -42,7 +42,7 @@ def test_at_its_vertices_a_baked_field_is_the_field() -> None:
     sigma, rgb = baked(positions, toward)
     # float32 positions; a vertex's own weight is 1 to rounding
     np.testing.assert_allclose(sigma, expected[0], rtol=1e-4, atol=1e-4)
-    # the ridge takes off a few hundredths of colours that differ by 0.27 from grey
+    # the ridge takes off a few hundredths of colors that differ by 0.27 from gray
     assert np.abs(rgb - expected[1]).mean() < 0.01
     seen = expected[0] > 1.0
     np.testing.assert_allclose(rgb[seen], expected[1][seen], atol=0.05)
@@ -83,8 +83,8 @@ def test_a_contracted_field_reaches_beyond_its_box() -> None:
     np.testing.assert_allclose(baked(positions, d)[0], field(positions, d)[0], rtol=1e-3, atol=1e-3)
 
 
-def test_directions_from_the_cameras_decide_where_colour_matters() -> None:
-    """All cameras on one side: there the fit is close although the colour is no low-degree harmonic."""
+def test_directions_from_the_cameras_decide_where_color_matters() -> None:
+    """All cameras on one side: there the fit is close although the color is no low-degree harmonic."""
 
     class Split(Tilted):
         def __call__(self, positions, viewdirs):
@@ -124,7 +124,7 @@ def test_progress_ends_at_one() -> None:
     assert seen == sorted(seen) and seen[-1] == 1.0
 
 
-def test_growing_reaches_all_26_neighbours() -> None:
+def test_growing_reaches_all_26_neighbors() -> None:
     mask = np.zeros((5, 5, 5), bool)
     mask[2, 2, 2] = True
     expected = np.zeros((5, 5, 5), bool)

@@ -110,7 +110,7 @@ def test_cages_hold_one_part_and_it_lands_where_nothing_is(one: Case) -> None:
     scene = procedural_scene(one.scene)
     low, high = scene.part_bounds(part)
     inside = solids(scene, np.stack([low, high]))[part]
-    # The rest of a part is out of sight, sunk in its neighbour or, of the cushion, the side it lies on.
+    # The rest of a part is out of sight, sunk in its neighbor or, of the cushion, the side it lies on.
     assert held_by(one, inside).mean() > 0.92
     held = {name: int(held_by(one, p).sum()) for name, p in solids(scene, held_box(one)).items()}
     assert sum(held.values()) - held[part] < 0.02 * held[part]
@@ -210,7 +210,7 @@ def test_photos_of_the_data_set_are_the_unedited_truth(bench: Workbench) -> None
     for view, picture in zip(views, truth, strict=True):
         photo = view.load().astype(float)
         white = photo[..., :3] * photo[..., 3:] / 255 + 255 - photo[..., 3:]
-        assert np.abs(white - picture).max() <= 1.0  # colour and alpha are rounded to 8 bits
+        assert np.abs(white - picture).max() <= 1.0  # color and alpha are rounded to 8 bits
 
 
 @pytest.mark.nightly

@@ -42,7 +42,7 @@ def _camera(lens: str, **changes) -> Camera:
     return Camera(c2w=_pose(), **{**values, **changes}, model=model, distortion=distortion)
 
 
-def _centres(camera: Camera) -> np.ndarray:
+def _centers(camera: Camera) -> np.ndarray:
     columns, rows = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     return np.stack([columns.ravel(), rows.ravel()], axis=1)
 
@@ -51,7 +51,7 @@ def test_pinhole_directions_in_closed_form():
     camera = Camera.from_fov(np.eye(4), 4, 2, math.radians(90))
     assert (camera.fx, camera.fy, camera.cx, camera.cy) == pytest.approx((2, 2, 2, 1))
     local = camera.local_directions().reshape(2, 4, 3)
-    # the top left pixel's centre is 1.5 px left of and 0.5 px above the axis, at 2 px focal length
+    # the top left pixel's center is 1.5 px left of and 0.5 px above the axis, at 2 px focal length
     expected = np.array([-1.5, 0.5, -2.0])
     np.testing.assert_allclose(local[0, 0], expected / np.linalg.norm(expected), atol=1e-7)
     np.testing.assert_allclose(local[1, 3], -expected / np.linalg.norm(expected) * (1, 1, -1), atol=1e-7)
@@ -68,7 +68,7 @@ def test_project_undoes_rays(lens):
     distance = np.linspace(0.5, 7.0, len(directions))[:, None]
     positions, depth = camera.project(origins + distance * directions.astype(np.float64))
     # float32 directions are good to 1e-7 relative; the steepest of these lenses turns that into 1e-5 px
-    np.testing.assert_allclose(positions, _centres(camera), atol=2e-4)
+    np.testing.assert_allclose(positions, _centers(camera), atol=2e-4)
     expected = distance[:, 0] * -camera.local_directions()[:, 2]
     np.testing.assert_allclose(depth, expected, atol=2e-6)
 
@@ -77,7 +77,7 @@ def test_project_undoes_rays(lens):
 def test_unproject_is_exact_in_float64(lens):
     model, coefficients = LENSES[lens]
     camera = _camera(lens)
-    image = (_centres(camera) - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+    image = (_centers(camera) - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
     directions, seen = lenses.unproject(image, model, coefficients)
     assert seen.all()
     np.testing.assert_allclose(lenses.project(directions, model, coefficients), image, atol=1e-12)
@@ -224,7 +224,7 @@ def test_downscaled_pixels_are_boxes(lens):
     origins, directions = small.rays()
     large, _ = camera.project(origins + 3 * directions)
     np.testing.assert_allclose(
-        large, 4 * _centres(small), atol=1e-3
+        large, 4 * _centers(small), atol=1e-3
     )  # 4 times the float32 error of test above
 
 
@@ -243,7 +243,7 @@ def test_look_at_has_the_target_in_the_middle_and_up_upwards():
     assert depth[0] == pytest.approx(math.dist((1, -2, 3), (0.5, 0.25, 1)))
     assert positions[1, 0] == pytest.approx(20) and positions[1, 1] < 15  # +z is upwards: a smaller row
     edge = camera.rays([[0, 14]])[1][0] @ camera.forward
-    assert math.acos(edge) == pytest.approx(0.5, abs=0.03)  # the outer pixel's centre, half a pixel inside
+    assert math.acos(edge) == pytest.approx(0.5, abs=0.03)  # the outer pixel's center, half a pixel inside
     with pytest.raises(CameraError, match="parallel to the direction of view; choose another up"):
         Camera.look_at((0, 0, 3), (0, 0, 0), width=40, height=30, fov_x=1.0)
     with pytest.raises(CameraError, match="target must differ from eye"):
@@ -361,7 +361,7 @@ def test_poses_printed_with_three_decimals_are_accepted_and_stay_consistent():
         origins, directions = camera.rays()
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, atol=2e-7)
     positions, _ = camera.project(origins + 2 * directions.astype(np.float64))
-    np.testing.assert_allclose(positions, _centres(camera), atol=2e-4)
+    np.testing.assert_allclose(positions, _centers(camera), atol=2e-4)
 
 
 def test_camera_cannot_be_changed():

@@ -82,7 +82,7 @@ def test_no_command_shows_the_help(capsys: pytest.CaptureFixture[str]) -> None:
         (["paint"], "paint"),
         (["render", "scene"], "--out"),
         (["render", "scene", "-o", "out", "--device", "tpu"], "invalid choice 'tpu'"),
-        (["info", "scene", "--colour", "red"], "--colour"),
+        (["info", "scene", "--color", "red"], "--color"),
         (["make-scene", "digger", "-o", "out", "--views", "many"], "many"),
     ],
 )
@@ -132,7 +132,7 @@ def test_info_says_what_is_there(capsys: pytest.CaptureFixture[str], scene: Path
     for fact in (
         "version 1",
         f"17 x 17 x 17 voxels, {stored} stored",
-        "colour SH degree 0",
+        "color SH degree 0",
         "train: 3 24x16",
         "test: 2 24x16",
         '1. "lift": continuous, flow shell, exact',

@@ -48,7 +48,7 @@ def saved(scene: Scene, folder: Path, *edits: Edit) -> Path:
     return folder
 
 
-def centre(file: Path) -> np.ndarray:
+def center(file: Path) -> np.ndarray:
     """The mean position of a PLY's vertices."""
     vertex = read_ply(file).elements["vertex"]
     return np.stack([vertex[axis] for axis in "xyz"], axis=1).mean(axis=0)
@@ -136,7 +136,7 @@ def test_quarter_turns_bring_every_axis_upright() -> None:
 def test_a_scene_with_z_up_stands_upright_in_files(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, ending: str, least: float
 ) -> None:
-    # Splats of all shapes and colours, more of them below: turned with their harmonics, or pictures differ.
+    # Splats of all shapes and colors, more of them below: turned with their harmonics, or pictures differ.
     # Harmonics that are not turned give 21 to 24 dB; what .spz and .sog round off comes to 40 and 60.
     field = random_splats(60, degree=2)
     field = field.take(np.argsort(field.means[:, 2])[:45])
@@ -237,10 +237,10 @@ def test_an_edited_field_is_the_field_where_it_was_taken_from() -> None:
     points = chance.uniform(-1, 1, (4000, 3)).astype(np.float32)
     along = np.tile(np.float32([0, 0, 1]), (4000, 1))
     sigma, rgb = edited(points, along)
-    expected, colour = field(points - np.array([0.25, 0, 0]), along)
+    expected, color = field(points - np.array([0.25, 0, 0]), along)
     held, left = MOVED.deformed.contains(points.astype(float)), INNER.contains(points.astype(float))
     np.testing.assert_allclose(sigma[held], expected[held], rtol=1e-3, atol=1e-3)
-    np.testing.assert_allclose(rgb[held], colour[held], atol=1e-3)
+    np.testing.assert_allclose(rgb[held], color[held], atol=1e-3)
     assert (sigma[left & ~held] == 0).all() and (sigma[held] > 0).any()
 
 
@@ -250,8 +250,8 @@ def test_meshes_have_the_edits_in_them(capsys: pytest.CaptureFixture[str], tmp_p
     scene = ball_scene() if kind == "voxels" else splat_scene()
     folder = saved(scene, tmp_path / "scene", MOVED)
     said = printed(capsys, "export", folder, "-o", tmp_path / "out.ply", "--as", "mesh", "--resolution", 48)
-    assert "triangles" in said and "vertices with colours" in said
-    np.testing.assert_allclose(centre(tmp_path / "out.ply"), (0.25, 0, 0), atol=0.03)
+    assert "triangles" in said and "vertices with colors" in said
+    np.testing.assert_allclose(center(tmp_path / "out.ply"), (0.25, 0, 0), atol=0.03)
     mesh = scene_mesh(Scene.open(folder), 48)
     assert np.abs(np.linalg.norm(mesh.positions - [0.25, 0, 0], axis=1) - 0.5).max() < 0.15
     assert (mesh.rgb[:, 0] > mesh.rgb[:, 1]).mean() > 0.99  # red
@@ -271,7 +271,7 @@ def test_a_selected_part_of_a_mesh(capsys: pytest.CaptureFixture[str], tmp_path:
 def test_points_lie_on_the_surface(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     folder = saved(splat_scene(), tmp_path / "scene", MOVED)
     said = printed(capsys, "export", folder, "-o", tmp_path / "p.ply", "--as", "points", "--splats", 500)
-    assert "500 points with normals and colours" in said
+    assert "500 points with normals and colors" in said
     vertex = read_ply(tmp_path / "p.ply").elements["vertex"]
     points = np.stack([vertex[axis] for axis in "xyz"], axis=1) - (0.25, 0, 0)
     radius = np.linalg.norm(points, axis=1)

@@ -58,7 +58,7 @@ def test_info_says_what_is_there(capsys: pytest.CaptureFixture[str], scene: Path
     for fact in (
         "600 splats (0.0 MB in memory), antialiased",
         "box 2 x 2 x 2 around (0, 0, 0)",
-        f"splat width {width:.4g}, colour SH degree 0",
+        f"splat width {width:.4g}, color SH degree 0",
         "train: 3 24x16",
         '1. "lift": continuous, flow shell, lattice of 16^3 nodes',
         f"{share:.1%} of the field's splats follow the cage, whose corners move by up to 0.2",

@@ -39,7 +39,7 @@ STRENGTH = 0.7
 
 
 def room(box: bool, *, scale: float = 1.0, resolution: int = 44, reach: float = 0.3) -> VoxelField:
-    """A coloured floor, with a box on it or without one, shaded by how near the other is.
+    """A colored floor, with a box on it or without one, shaded by how near the other is.
 
     Under the box, which no photo would show, the floor is black.
     """
@@ -188,7 +188,7 @@ def test_patches_are_kept_while_a_cage_is_dragged(scenes: tuple[Scene, Scene]) -
 
 
 def other(field: VoxelField, box: NDArray[np.float64], rgb: tuple[float, float, float]) -> VoxelField:
-    """A layer of one colour in a box, as dense as its height says."""
+    """A layer of one color in a box, as dense as its height says."""
     block = extract_block(field, EditStack(), box)
     every = np.ones(block.shape, bool)
     heights = block.positions(every)[:, 2]
@@ -359,7 +359,7 @@ def test_a_clone_fills_with_what_another_cage_holds(scenes: tuple[Scene, Scene])
 
 
 def test_the_rim_of_a_part_blends_into_what_it_is_put_into() -> None:
-    """A piece of floor, set into the floor elsewhere: its colours differ, and a feathered seam is softer."""
+    """A piece of floor, set into the floor elsewhere: its colors differ, and a feathered seam is softer."""
     scene = Scene(room(False), cameras={"train": cameras()})
     piece = Cage.box((-0.4, -0.4, FLOOR), (0.5, 0.5, 0.4))
     above = Camera.look_at((0.35, 0.3, 1.5), (0.35, 0.31, FLOOR), width=64, height=64, fov_x=0.4)

@@ -28,7 +28,7 @@ from test_continuous_relighting import room as gap_room
 
 
 def handle(held: bool) -> VoxelField:
-    """A red box on a grey rod that comes from above: hollow and black where that holds it."""
+    """A red box on a gray rod that comes from above: hollow and black where that holds it."""
     axis = np.linspace(-1.0, 1.0, 61)
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
     box = (np.abs(x + 0.4) < 0.32) & (np.abs(y) < 0.32) & (np.abs(z + 0.3) < 0.22)
@@ -81,8 +81,8 @@ def test_the_strength_of_a_shade_is_measured_around_it() -> None:
     assert strength(1.0, bright) < 0.75  # no shade is seen there
 
 
-def test_a_rim_in_deep_shade_does_not_colour_what_is_filled() -> None:
-    """A dark ring around the hole, whose light was changed: hole and ring get the colours beyond."""
+def test_a_rim_in_deep_shade_does_not_color_what_is_filled() -> None:
+    """A dark ring around the hole, whose light was changed: hole and ring get the colors beyond."""
     axis = np.linspace(-1.0, 1.0, 41)
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
     away = np.hypot(x, y)
@@ -108,7 +108,7 @@ def test_a_rim_in_deep_shade_does_not_colour_what_is_filled() -> None:
     assert bright[14] > 0.25 and np.abs(bright - dark)[:10].max() < 1e-6
 
 
-def test_what_a_lifted_part_hid_takes_the_colours_around() -> None:
+def test_what_a_lifted_part_hid_takes_the_colors_around() -> None:
     """Deep in the gap under the box the floor is noise, which new light would only make brighter."""
     field = gap_room(0.0)
     chance, rows = np.random.default_rng(0), field.sh.copy()

@@ -73,7 +73,7 @@ def test_units_make_no_difference(scale):
     assert db(there, seen(usual, patched(usual, Edit.delete(cage())))) > 35.0
 
 
-def test_fill_is_of_splats_of_its_colour_that_look_the_same_all_around():
+def test_fill_is_of_splats_of_its_color_that_look_the_same_all_around():
     """Whatever the nearest ones are: every other splat shimmers, and what is in shade is dark."""
     field = room(True)
     sh = np.zeros((len(field), 4, 3), np.float32)
@@ -87,7 +87,7 @@ def test_fill_is_of_splats_of_its_colour_that_look_the_same_all_around():
 
 
 def strips() -> SplatField:
-    """A grey floor of splats that are long along x."""
+    """A gray floor of splats that are long along x."""
     y = np.arange(-0.8, 0.81, 0.05)
     x = np.tile([-0.4, 0.4], len(y))
     means = np.stack([x, np.repeat(y, 2), np.zeros(2 * len(y))], axis=1)
@@ -215,7 +215,7 @@ def test_scenes_fill_and_relight_splats_unless_told_not_to():
     assert there.patch is further.patch is not None
 
 
-def test_voxelised_splats_are_as_opaque_and_as_coloured():
+def test_voxelised_splats_are_as_opaque_and_as_colored():
     field = room(False)
     voxels = voxelize_splats(field, np.array([[-0.5, -0.5, -0.2], [0.5, 0.5, 0.2]]), 0.025)
     z = voxels.vertices % voxels.resolution[2]

@@ -37,7 +37,7 @@ RAISED = Edit.continuous(INNER, OUTER, lattice=32).translate((0.0, 0.0, LIFT))
 
 
 def room(lift: float, resolution: int = VERTICES) -> VoxelField:
-    """A grey floor, and a box so high over it beside the gap; both are shaded by how near the other is."""
+    """A gray floor, and a box so high over it beside the gap; both are shaded by how near the other is."""
     axis = np.linspace(-1.0, 1.0, resolution)
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
     edge = axis[1] - axis[0]

@@ -128,7 +128,7 @@ def test_missing_photos_are_named_and_none_left_is_an_error(tmp_path):
         load_dataset(tmp_path)
 
 
-def test_points_are_in_the_levelled_world_with_colours_errors_and_the_views_that_see_them(tmp_path):
+def test_points_are_in_the_levelled_world_with_colors_errors_and_the_views_that_see_them(tmp_path):
     _write(tmp_path, n=4)
     model = pycolmap.Reconstruction(tmp_path / "sparse/0")
     for image_id in (1, 2, 3, 4):  # the marked point's image in each, so that it has a track

@@ -37,7 +37,7 @@ def test_box_filter_of_rgb(tmp_path, factor):
     np.testing.assert_allclose(small, means, atol=0.6)  # whole numbers, rounded in Pillow's fixed point
 
 
-def test_box_filter_of_rgba_weights_colours_by_alpha(tmp_path):
+def test_box_filter_of_rgba_weights_colors_by_alpha(tmp_path):
     pixels = np.zeros((2, 4, 4), dtype=np.uint8)
     pixels[0, 0] = (200, 100, 50, 255)
     pixels[0, 1] = (0, 250, 0, 85)  # a third as opaque, so a third of the weight
@@ -60,7 +60,7 @@ def test_composite_of_shrunk_cut_out_is_the_shrunk_composite(tmp_path):
         return rgba[..., :3] * alpha + 255 * (1 - alpha)
 
     direct = on_white(pixels.astype(float)).reshape(3, 4, 4, 4, 3).mean(axis=(1, 3))
-    np.testing.assert_allclose(on_white(small), direct, atol=1.6)  # alpha and colour each rounded once
+    np.testing.assert_allclose(on_white(small), direct, atol=1.6)  # alpha and color each rounded once
 
 
 @pytest.mark.parametrize("channels", [3, 4])

@@ -58,7 +58,7 @@ def test_points_lie_on_the_surfaces_that_the_photos_show(data, points):
     assert np.median(points.errors) < 1.0 and points.errors.max() <= 4.0
 
 
-def test_colours_are_those_of_the_photos_at_the_points(data, points):
+def test_colors_are_those_of_the_photos_at_the_points(data, points):
     camera, photo = data.train[0].camera, data.train[0].load()
     rows = [i for i, seen in enumerate(points.seen_by) if data.train[0].name in seen]
     at, _ = camera.project(points.positions[rows])
@@ -272,7 +272,7 @@ def test_pairs_of_many_cameras_are_the_nearest_and_never_face_each_other():
     assert nearest_pairs(opposite) == []
 
 
-def test_random_points_are_seen_and_have_the_photos_colours(data):
+def test_random_points_are_seen_and_have_the_photos_colors(data):
     found = random_points(data, 400, seed=3)
     assert len(found) == 400
     inside = np.all((found.positions >= data.bounds[0]) & (found.positions <= data.bounds[1]), axis=1)

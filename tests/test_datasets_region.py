@@ -72,7 +72,7 @@ def test_sparse_points_tighten_the_cube():
 def test_forward_facing_capture_uses_depths():
     cameras = _cameras(_facing(9, 0.3, toe_in=0.05))
     cube = cube_of_interest(cameras, np.tile([2.0, 4.0], (9, 1)))
-    # centre at depth 3; the picture is 3 tan(0.5) = 1.64 to each side there, wider than the depth range's 1
+    # center at depth 3; the picture is 3 tan(0.5) = 1.64 to each side there, wider than the depth range's 1
     np.testing.assert_allclose(cube.mean(axis=0), (0, 3, cube.mean(axis=0)[2]), atol=0.05)
     np.testing.assert_allclose(cube[1] - cube[0], 2 * 3 * np.tan(0.5), rtol=1e-6)
     deep = cube_of_interest(

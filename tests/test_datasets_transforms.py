@@ -438,7 +438,7 @@ def test_fox_is_an_unbounded_capture_of_43_and_7_views(fox):
     assert camera.fx == pytest.approx(1375.52 / 4) and camera.cy == pytest.approx(965.268 / 4)
     assert camera.distortion[:4] == (0.0578421, -0.0805099, -0.000980296, 0.00015575)
     assert fox.train[0].load().shape == (480, 270, 3)
-    # the capture's tool centred the world on the point the cameras look at
+    # the capture's tool centered the world on the point the cameras look at
     np.testing.assert_allclose(fox.bounds.mean(axis=0), 0, atol=0.3)
 
 

@@ -141,7 +141,7 @@ def test_an_empty_stack_returns_the_same_arrays():
     assert plain.means is field.means and plain.sh is field.sh and plain.rotations is None
 
 
-def test_what_no_edit_reaches_stays_bit_for_bit_and_shares_its_colours():
+def test_what_no_edit_reaches_stays_bit_for_bit_and_shares_its_colors():
     field, edits = random_splats(400), EditStack(EDITS["rotate"])
     plain, got = deformed_splats(field, EditStack()), deformed_splats(field, edits)
     outside = ~OUTER.contains(field.means)
@@ -176,7 +176,7 @@ def test_scaling_everything_is_a_nearer_camera():
 
 
 def blob(scales=(0.12, 0.08, 0.05), depth: float = 0.3, at=(0.1, 0.0, 0.05)) -> tuple[SplatField, object]:
-    """One grey splat, and the density of the same Gaussian whose rays through the mean lose as much.
+    """One gray splat, and the density of the same Gaussian whose rays through the mean lose as much.
 
     The density is -log(1 - o) times the Gaussian over its line integral along the ray: that is what the
     picture of a splat means, and it depends on the ray's direction.

@@ -24,7 +24,7 @@ TOWARDS = np.array([0.45, -0.2, 0.2])
 
 
 def balls(towards: NDArray[np.float64], resolution: int = 64) -> VoxelField:
-    """A grey ball on a floor, lit by 1 + towards . n, without shadows."""
+    """A gray ball on a floor, lit by 1 + towards . n, without shadows."""
     axis = np.linspace(-1.0, 1.0, resolution)
     at = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
     edge = axis[1] - axis[0]

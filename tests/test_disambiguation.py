@@ -37,7 +37,7 @@ def test_photos_in_order_are_told_from_others():
     assert not is_sequence(_counts(7, 6))
 
 
-def test_far_pairs_are_those_beyond_the_neighbours():
+def test_far_pairs_are_those_beyond_the_neighbors():
     assert [neighborhood_size(n) for n in (9, 24, 40, 71, 500)] == [3, 3, 5, 8, 8]
     found = distant_pairs(_counts(40, 6, period=20))
     assert {j - i for i, j in found} == set(range(16, 25))

@@ -285,7 +285,7 @@ def test_lattice_points_are_dragged_alone_and_by_rows(editor: EditorPage, folder
     editor.press("Escape")
 
 
-def test_control_points_take_neighbours_along_and_are_connected(editor: EditorPage, folder: Path) -> None:
+def test_control_points_take_neighbors_along_and_are_connected(editor: EditorPage, folder: Path) -> None:
     editor.loaded(folder / "points.yaml")
     editor.tools(tool="select")
     editor.press("o")
@@ -399,12 +399,12 @@ def test_a_scene_is_pasted(editor: EditorPage) -> None:
 
 
 def test_views_split_and_before(editor: EditorPage) -> None:
-    colour = shot(editor)
+    color = shot(editor)
     editor.page.click('.top [data-view="normals"]')
     editor.settle()
     assert editor.page.evaluate("cagefield.picture.view") == "normals"
-    assert np.abs(shot(editor) - colour).max() > 0.3
-    editor.page.click('.top [data-view="colour"]')
+    assert np.abs(shot(editor) - color).max() > 0.3
+    editor.page.click('.top [data-view="color"]')
     editor.settle()
     editor.press("p")
     editor.until("cagefield.picture.split !== null && cagefield.settled")

@@ -328,7 +328,7 @@ def test_a_camera_amid_the_field_orbits_around_what_it_sees(opened: EditorPage, 
             assert turned < 0.95
             # It still looks at the point, from as far: to a hundredth, the depth's resolution.
             np.testing.assert_allclose(after[:3, 3] - distance * after[:3, 2], seen, atol=0.01 * distance)
-            # Back where it began, the centre is taken anew from what is seen there.
+            # Back where it began, the center is taken anew from what is seen there.
             page.page.keyboard.press("Home")
             page.settle()
             np.testing.assert_allclose(pose(), before, atol=1e-6)

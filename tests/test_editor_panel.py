@@ -72,8 +72,8 @@ def editor(opened: EditorPage, folder: Path) -> EditorPage:
 
 
 def test_views_show_depth_opacity_and_normals(editor: EditorPage) -> None:
-    colour = editor.pixels()
-    column, row = np.round(cone(colour).at).astype(int)
+    color = editor.pixels()
+    column, row = np.round(cone(color).at).astype(int)
     pictures = {}
     for view in ("depth", "opacity", "normals"):
         editor.page.click(f'.top [data-view="{view}"]')
@@ -106,7 +106,7 @@ def test_views_show_depth_opacity_and_normals(editor: EditorPage) -> None:
 
     editor.press("v")  # the last view's next is the first again
     editor.settle()
-    assert difference(editor.pixels(), colour) < 0.1
+    assert difference(editor.pixels(), color) < 0.1
 
 
 def test_what_a_delete_uncovers_is_filled_unless_it_is_switched_off(
@@ -213,7 +213,7 @@ def test_edits_are_hidden_locked_renamed_and_duplicated(editor: EditorPage) -> N
     editor.changed(lambda: editor.press("Control+d"))
     one, two = editor.edits
     assert two["name"] == "traffic cone 2" and editor.edit["id"] == two["id"] != one["id"]
-    assert two["deformed"] == one["deformed"] and two["colour"] != one["colour"]
+    assert two["deformed"] == one["deformed"] and two["color"] != one["color"]
     # What the copy moves has been moved already: what was below the cone comes up in its place.
     assert difference(editor.pixels(), editor.pixels(cages=True)) > 0.3
     assert len(page.query_selector_all(".edit")) == 2
@@ -248,13 +248,13 @@ def test_a_mirrored_copy(editor: EditorPage) -> None:
     flipped = np.array(one["deformed"])[[1, 0, 3, 2, 5, 4, 7, 6]]
     flipped[:, 0] = low[0] + high[0] - flipped[:, 0]
     assert np.allclose(two["deformed"], flipped, atol=1e-9) and editor.edit["id"] == two["id"]
-    assert two["operations"] == one["operations"] and two["colour"] != one["colour"]
-    # Its cage is drawn where it is, in its colour.
+    assert two["operations"] == one["operations"] and two["color"] != one["color"]
+    # Its cage is drawn where it is, in its color.
     x, y = (round(c - editor.box[axis]) for c, axis in zip(editor.part("corner", 5), "xy", strict=True))
-    colour = np.array([int(two["colour"][n : n + 2], 16) for n in (1, 3, 5)]) / 255.0
+    color = np.array([int(two["color"][n : n + 2], 16) for n in (1, 3, 5)]) / 255.0
     around = editor.pixels(cages=True)[y - 6 : y + 7, x - 6 : x + 7]
-    assert np.abs(around - colour).max(axis=2).min() < 0.12
-    assert np.abs(plain[y - 6 : y + 7, x - 6 : x + 7] - colour).max(axis=2).min() > 0.12
+    assert np.abs(around - color).max(axis=2).min() < 0.12
+    assert np.abs(plain[y - 6 : y + 7, x - 6 : x + 7] - color).max(axis=2).min() > 0.12
 
 
 def test_an_edits_numbers_are_copied_and_pasted_as_text(editor: EditorPage) -> None:

@@ -1,6 +1,6 @@
 """The editor in a real browser on a scene of splats: what a user does, seen in pixels and in the state.
 
-A red ball over a grey floor, one server and one page for all tests; each begins without edits.
+A red ball over a gray floor, one server and one page for all tests; each begins without edits.
 """
 
 from __future__ import annotations
@@ -79,9 +79,9 @@ def test_double_click_places_cages_around_the_surface(editor: EditorPage) -> Non
     editor.until("cagefield.now.state.edits.length === 2 && cagefield.now.mode === 'set'")
     editor.settle()
     placed = editor.edit
-    centre = np.mean(placed["inner"], axis=0)
+    center = np.mean(placed["inner"], axis=0)
     # The point of the ball that looks at the camera, which is at (0, -3, .9).
-    np.testing.assert_allclose(centre, [0.0, -RADIUS * 0.958, RADIUS * 0.287], atol=0.04)
+    np.testing.assert_allclose(center, [0.0, -RADIUS * 0.958, RADIUS * 0.287], atol=0.04)
     assert np.ptp(placed["outer"], axis=0).min() > np.ptp(placed["inner"], axis=0).max()
 
 

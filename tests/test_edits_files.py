@@ -187,8 +187,8 @@ def test_edits_that_cannot_be_evaluated_are_errors_unless_asked_for(tmp_path: Pa
             'line 6: edits.0..operations.0..rotate: unknown key "rotate"; did you mean "rotate_deg"',
         ),
         (
-            ("name: arm", "colour: red"),
-            'line 2: edits.0..colour: unknown key "colour"; the keys here are inner, name',
+            ("name: arm", "color: red"),
+            'line 2: edits.0..color: unknown key "color"; the keys here are inner, name',
         ),
         (("0.1]", ".nan]"), r"line 6: edits.0..operations.0..translate.2.: numbers must be finite, got nan"),
         (("0.1]", "-.inf]"), "numbers must be finite, got -inf"),

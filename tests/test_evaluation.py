@@ -62,7 +62,7 @@ def test_cut_outs_are_composited_on_white():
 
 
 def test_views_are_compared_without_excluded_pixels_over_their_own_background(tmp_path, monkeypatch):
-    """A field that is grey everywhere: .5 on black photos with a masked white square, .75 on a cut-out."""
+    """A field that is gray everywhere: .5 on black photos with a masked white square, .75 on a cut-out."""
     asked = []
 
     def render(camera: Camera, background: str) -> Any:

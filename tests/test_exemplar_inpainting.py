@@ -20,7 +20,7 @@ def hole(radius: float = 14.0) -> Mask:
 
 
 def spots(seed: int = 0) -> Array:
-    """Soft spots of two colours, some ten columns wide."""
+    """Soft spots of two colors, some ten columns wide."""
     chance = np.random.default_rng(seed)
     noise = ndimage.gaussian_filter(chance.normal(size=(SIZE, SIZE)), 3.0)
     share = 1.0 / (1.0 + np.exp(-noise / (0.3 * noise.std())))
@@ -60,7 +60,7 @@ def test_a_large_hole_goes_by_patches_farther_apart(monkeypatch: pytest.MonkeyPa
 
 
 def test_spots_go_on() -> None:
-    """Of the colours that are there, without a seam, and not as weak as those of a membrane."""
+    """Of the colors that are there, without a seam, and not as weak as those of a membrane."""
     gap, inner = hole(), hole(9.0)
     strength = []
     for seed in range(4):
@@ -75,13 +75,13 @@ def test_spots_go_on() -> None:
     assert now > 0.55 and now > 2.0 * left
 
 
-def test_one_colour_stays_one() -> None:
+def test_one_color_stays_one() -> None:
     colors, gap = np.full((SIZE, SIZE, 3), 0.25), hole()
     np.testing.assert_allclose(filled(colors, gap)[1][gap], 0.25, atol=1e-9)
 
 
 def test_a_pattern_that_does_not_fit_is_left_out() -> None:
-    """Beside a rim of a colour that is nowhere else spots would show where the hole was."""
+    """Beside a rim of a color that is nowhere else spots would show where the hole was."""
     colors, gap = spots(), hole()
     colors[hole(15.5) & ~gap] = (0.2, 0.4, 3.0)
     start, found = filled(colors, gap)

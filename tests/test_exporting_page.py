@@ -69,7 +69,7 @@ def test_mouse_wheel_and_keys_move_the_camera(tmp_path: Path) -> None:
         page.mouse.up()
         settle(page)
         turned, target = orbit(page)
-        # A quarter of the height is an eighth of a full turn, about the orbit's centre, at the same height.
+        # A quarter of the height is an eighth of a full turn, about the orbit's center, at the same height.
         a, b = (v[:2] / np.linalg.norm(v[:2]) for v in (first - target, turned - target))
         assert np.dot(a, b) == pytest.approx(np.cos(np.pi / 4), abs=1e-6)
         assert turned[2] == pytest.approx(first[2])
@@ -103,15 +103,15 @@ def test_one_finger_turns_and_two_shift_and_pinch(tmp_path: Path) -> None:
         assert np.dot(a, b) == pytest.approx(np.cos(np.pi / 4), abs=1e-6)
         # Both fingers by a third of the height: what was in the middle of the picture is there now.
         hand.move([(40, 60), (60, 60)], [(40, 100), (60, 100)])
-        shifted, centre = orbit(page)
+        shifted, center = orbit(page)
         far = np.linalg.norm(turned - target)
-        np.testing.assert_allclose(shifted - centre, turned - target, atol=1e-6)
+        np.testing.assert_allclose(shifted - center, turned - target, atol=1e-6)
         tangent = np.tan(0.5 * np.radians(page.evaluate("cagefieldViewer.viewer.fov")))
-        assert np.linalg.norm(centre - target) == pytest.approx(2.0 * tangent * far / 3.0, rel=1e-6)
+        assert np.linalg.norm(center - target) == pytest.approx(2.0 * tangent * far / 3.0, rel=1e-6)
         # Twice as far apart is twice as near.
         hand.move([(50, 60), (70, 60)], [(40, 60), (80, 60)])
-        near, centre = orbit(page)
-        assert np.linalg.norm(near - centre) == pytest.approx(0.5 * far, rel=1e-6)
+        near, center = orbit(page)
+        assert np.linalg.norm(near - center) == pytest.approx(0.5 * far, rel=1e-6)
 
 
 def test_the_camera_path_is_played(tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ FRUIT = Path(__file__).resolve().parents[2] / "shared" / "data" / "splats" / "fr
 
 
 def splats_scene(*edits: Edit, count: int = 2000, smaller: float = 2.3) -> Scene:
-    """Small splats of all shapes, with edits, grey behind them."""
+    """Small splats of all shapes, with edits, gray behind them."""
     field = random_splats(count, degree=2)
     field = dataclasses.replace(field, log_scales=field.log_scales - smaller)
     cameras = turntable((0, 0, 0), 3.2, 3, elevation=0.4, width=SIZE, height=SIZE, fov_x=0.8)

@@ -48,7 +48,7 @@ def camera(contracted: bool) -> Camera:
 
 
 def check_alike(ours: RenderResult | None, drawn: Drawn, least: float = LEAST) -> None:
-    """Colour, opacity, depth and normals at least so many dB alike, and most of the picture not empty."""
+    """Color, opacity, depth and normals at least so many dB alike, and most of the picture not empty."""
     assert ours is not None and ours.normals is not None
     solid = ours.opacity > 0.5
     assert solid.mean() > 0.05
@@ -152,7 +152,7 @@ def test_what_is_closed_leaves_nothing_on_the_gpu(page: FieldPage) -> None:
         }""",
         [list(encode_page_field(field)), list(edits)],
     )
-    # Density, one of colour, index, two occupancies, a lattice: the targets went with the size.
+    # Density, one of color, index, two occupancies, a lattice: the targets went with the size.
     assert left.pop("most") == 6
     assert set(left.values()) == {0}
 

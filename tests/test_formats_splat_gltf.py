@@ -1,4 +1,4 @@
-"""What a .glb of splats says beside its splats: colour spaces, a node's rotation, whole numbers."""
+"""What a .glb of splats says beside its splats: color spaces, a node's rotation, whole numbers."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def changed(path: Path, change: Callable[[dict[str, Any]], Any], extra: bytes = 
 
 
 def in_space(path: Path, space: str | None) -> Path:
-    """The file with another colour space, or with none."""
+    """The file with another color space, or with none."""
 
     def change(gltf: dict[str, Any]) -> None:
         extension = gltf["meshes"][0]["primitives"][0]["extensions"][EXTENSION]
@@ -48,7 +48,7 @@ def in_space(path: Path, space: str | None) -> Path:
 
 
 def colors(sh: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """Colours [N,D,3] along directions [D,3]."""
+    """Colors [N,D,3] along directions [D,3]."""
     degree = int(np.sqrt(sh.shape[1])) - 1
     return 0.5 + np.einsum("dk,nkc->ndc", sh_basis(directions, degree), np.asarray(sh, np.float64))
 
@@ -121,8 +121,8 @@ def test_a_node_turns_splats_and_their_harmonics(tmp_path: Path) -> None:
     np.testing.assert_allclose(colors(read.sh, directions() @ R.T), seen, atol=1e-5)
 
 
-@pytest.mark.parametrize(("normalised", "factor"), [(True, 1.0 / 255.0), (False, 1.0)])
-def test_scales_may_be_whole_numbers_or_shares(tmp_path: Path, normalised: bool, factor: float) -> None:
+@pytest.mark.parametrize(("normalized", "factor"), [(True, 1.0 / 255.0), (False, 1.0)])
+def test_scales_may_be_whole_numbers_or_shares(tmp_path: Path, normalized: bool, factor: float) -> None:
     field = random_splats(10, degree=0)
     write_splats(field, tmp_path / "a.glb")
     codes = np.random.default_rng(0).integers(1, 256, (10, 3)).astype(np.uint8)
@@ -133,7 +133,7 @@ def test_scales_may_be_whole_numbers_or_shares(tmp_path: Path, normalised: bool,
         number = gltf["meshes"][0]["primitives"][0]["attributes"][f"{EXTENSION}:SCALE"]
         view = {"buffer": 0, "byteOffset": begin, "byteLength": len(extra), "byteStride": 4}
         gltf["bufferViews"][gltf["accessors"][number]["bufferView"]] = view
-        gltf["accessors"][number] |= {"componentType": 5121, "normalized": normalised}
+        gltf["accessors"][number] |= {"componentType": 5121, "normalized": normalized}
 
     read = read_splats(changed(tmp_path / "a.glb", change, extra))
     np.testing.assert_allclose(np.exp(read.log_scales), codes * factor, rtol=1e-5)

@@ -99,7 +99,7 @@ def test_comments_say_which_filter_the_splats_want(
     assert read_splats(tmp_path / "b.ply").antialiased is antialiased
 
 
-def test_flat_splats_and_byte_colours(tmp_path: Path) -> None:
+def test_flat_splats_and_byte_colors(tmp_path: Path) -> None:
     columns = columns_of(random_splats(4, degree=0))
     columns.pop("scale_2")
     for index, name in enumerate(("red", "green", "blue")):
@@ -129,14 +129,14 @@ def test_splats_without_numbers_are_left_out_with_a_warning(tmp_path: Path) -> N
     assert read.opacities[1] == 1.0 and read.log_scales[3, 0] == -30.0
 
 
-def packed(field, with_colours: bool, rest: np.ndarray | None = None) -> tuple[bytes, int]:
+def packed(field, with_colors: bool, rest: np.ndarray | None = None) -> tuple[bytes, int]:
     """A compressed file of the field, value by value and bit by bit, and the bytes before its vertices."""
     chunks = [slice(start, start + 256) for start in range(0, len(field), 256)]
     rgb = 0.5 + SH_C0 * field.sh[:, 0]
     chunk_rows, words = [], []
     for rows in chunks:
         limits = []
-        for values in (field.means[rows], field.log_scales[rows], rgb[rows])[: 3 if with_colours else 2]:
+        for values in (field.means[rows], field.log_scales[rows], rgb[rows])[: 3 if with_colors else 2]:
             limits.append((values.min(axis=0), values.max(axis=0)))
         chunk_rows.append(np.concatenate([np.concatenate(pair) for pair in limits]))
         for n in range(rows.start, min(rows.stop, len(field))):
@@ -149,7 +149,7 @@ def packed(field, with_colours: bool, rest: np.ndarray | None = None) -> tuple[b
                 return round(float(np.clip(fraction, 0, 1)) * (2**width - 1))
 
             p, s = share(field.means, 0), share(field.log_scales, 1)
-            c = share(rgb, 2) if with_colours else rgb[n]
+            c = share(rgb, 2) if with_colors else rgb[n]
             q = field.quaternions[n] * np.sign(field.quaternions[n][np.abs(field.quaternions[n]).argmax()])
             largest = int(np.abs(q).argmax())
             rotation = largest
@@ -168,7 +168,7 @@ def packed(field, with_colours: bool, rest: np.ndarray | None = None) -> tuple[b
             )
     names = [f"{end}_{axis}" for end in ("min", "max") for axis in "xyz"]
     names += [f"{end}_scale_{axis}" for end in ("min", "max") for axis in "xyz"]
-    names += [f"{end}_{axis}" for end in ("min", "max") for axis in "rgb"] if with_colours else []
+    names += [f"{end}_{axis}" for end in ("min", "max") for axis in "rgb"] if with_colors else []
     lines = [f"element chunk {len(chunks)}", *(f"property float {name}" for name in names)]
     lines += [f"element vertex {len(field)}"]
     lines += [f"property uint packed_{name}" for name in ("position", "rotation", "scale", "color")]
@@ -180,11 +180,11 @@ def packed(field, with_colours: bool, rest: np.ndarray | None = None) -> tuple[b
     return before + body, len(before)
 
 
-@pytest.mark.parametrize("with_colours", [False, True])
-def test_compressed_files(tmp_path: Path, with_colours: bool) -> None:
+@pytest.mark.parametrize("with_colors", [False, True])
+def test_compressed_files(tmp_path: Path, with_colors: bool) -> None:
     field = random_splats(300, degree=1, seed=4)
     rest = np.random.default_rng(5).integers(0, 256, (300, 9))
-    data, _ = packed(field, with_colours, rest)
+    data, _ = packed(field, with_colors, rest)
     (tmp_path / "a.ply").write_bytes(data)
     read = read_splats(tmp_path / "a.ply")
     # half a step of 10 bits over the box of 2, over the logarithms' range of 2.7
@@ -194,7 +194,7 @@ def test_compressed_files(tmp_path: Path, with_colours: bool) -> None:
     same = np.abs((read.quaternions * field.quaternions).sum(axis=1))
     assert same.min() > 1.0 - 3 * (np.sqrt(2.0) / 1023) ** 2
     shown, expected = (0.5 + SH_C0 * one.sh[:, 0] for one in (read, field))
-    if not with_colours:
+    if not with_colors:
         expected = np.clip(expected, 0.0, 1.0)
     np.testing.assert_allclose(shown, expected, atol=0.5 / 255 + 1e-6)
     # f_rest of green, first harmonic of degree 1: column 3

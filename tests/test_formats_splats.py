@@ -1,4 +1,4 @@
-"""Splat files of every format: against independent programs, their quantisation, real files, and damage."""
+"""Splat files of every format: against independent programs, their quantization, real files, and damage."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from splat_scenes import assert_same_splats, random_splats
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "splats"
 
-# Largest error of positions (units), log scales, rotations (1 - |q . q'|), opacities, colours and harmonics
+# Largest error of positions (units), log scales, rotations (1 - |q . q'|), opacities, colors and harmonics
 # of random_splats: half a step of what a format rounds to. SPZ: 2^-12, 1/16, 9 bits, 1/255, 1/(.15 x 255),
 # 1/16 and 1/8 (steps 8 and 16 of 128). Compressed: 11 and 10 bits over a chunk, 10 bits, 1/255, and 8/256 of
 # harmonics. SOG: 16 bits; codebooks and palettes have no bound but that of what they are made for.
@@ -66,7 +66,7 @@ def errors(got: SplatField, expected: SplatField) -> tuple[float, ...]:
 
 def assert_within(got: SplatField, expected: SplatField, ending: str) -> None:
     for name, error, bound in zip(
-        ("means", "log scales", "rotations", "opacities", "colours", "harmonics"),
+        ("means", "log scales", "rotations", "opacities", "colors", "harmonics"),
         errors(got, expected),
         BOUNDS[ending],
         strict=True,

@@ -29,10 +29,10 @@ def test_png_round_trip_is_exact(tmp_path, channels):
 
 def test_grey_palette_and_16_bit_files_become_rgb(tmp_path):
     gray = gradient(4, 6, 1)[..., 0]
-    Image.fromarray(gray).save(tmp_path / "grey.png")
+    Image.fromarray(gray).save(tmp_path / "gray.png")
     Image.fromarray(gray).convert("RGB").quantize(256).save(tmp_path / "palette.png")
     Image.fromarray(gray.astype(np.uint16) * 257).save(tmp_path / "deep.png")
-    for name in ("grey", "palette", "deep"):
+    for name in ("gray", "palette", "deep"):
         np.testing.assert_array_equal(read_image(tmp_path / f"{name}.png"), np.repeat(gray[..., None], 3, -1))
 
 
@@ -138,7 +138,7 @@ def test_video_of_odd_size_plays_back(tmp_path):
     played = [np.frombuffer(data, np.uint8).reshape(36, 52, 3) for data in reader]
     assert len(played) == len(frames)
     for index, color in ((1, colors[0]), (6, colors[1]), (10, colors[2])):
-        # YUV and compression cost a few levels on flat colour
+        # YUV and compression cost a few levels on flat color
         np.testing.assert_allclose(played[index].mean((0, 1)), color, atol=8)
 
 
@@ -207,7 +207,7 @@ def test_frame_is_read_only_and_checked():
         made.rgb[0, 0] = 0
     with pytest.raises(CagefieldError, match=r"depth must be \[4, 5\] like opacity, not \[4, 4\]"):
         RenderResult(made.rgb, made.opacity, made.depth[:, :4])
-    with pytest.raises(CagefieldError, match=r'"white", "black", "none" or \(r, g, b\), not "grey"'):
-        background_rgb("grey")
+    with pytest.raises(CagefieldError, match=r'"white", "black", "none" or \(r, g, b\), not "gray"'):
+        background_rgb("gray")
     with pytest.raises(CagefieldError, match=r"three numbers in \[0, 1\]"):
         background_rgb((0, 0, 300))

@@ -332,7 +332,7 @@ def test_agreement_is_the_psnr_of_the_pictures(scene) -> None:
     camera = opened.cameras["test"][0].resized(8, 8)
     exact = NerfRenderer(opened.original).render(camera, background="white")
     expected = psnr(np.clip(opened.render(camera, background="white").rgb, 0, 1), exact.rgb)
-    # the exact colours may exceed 1 by rounding before they are clipped
+    # the exact colors may exceed 1 by rounding before they are clipped
     assert agreement(opened.original, opened.field, [camera], "white") == pytest.approx(expected, abs=1e-3)
 
 

@@ -128,7 +128,7 @@ def test_views_are_the_servers(pair: tuple[EditorPage, EditorPage], scene: Path,
         if view == "split":
             page.press("p")
         else:
-            page.page.click("[data-view=colour]")
+            page.page.click("[data-view=color]")
 
 
 def test_a_page_that_reconnects_keeps_the_field(pair: tuple[EditorPage, EditorPage]) -> None:

@@ -221,9 +221,9 @@ def test_what_is_sent_of_a_layer_is_where_it_is_other_than_the_field() -> None:
     unit = 1.0 / field.voxel_size.min()
 
     def dense(source: VoxelField) -> tuple[np.ndarray, np.ndarray]:
-        values, colours = np.zeros(np.prod(field.resolution)), np.zeros((np.prod(field.resolution), 4, 3))
-        values[source.vertices], colours[source.vertices] = source.density, source.sh
-        return values.reshape(field.resolution), colours.reshape(*field.resolution, 4, 3)
+        values, colors = np.zeros(np.prod(field.resolution)), np.zeros((np.prod(field.resolution), 4, 3))
+        values[source.vertices], colors[source.vertices] = source.density, source.sh
+        return values.reshape(field.resolution), colors.reshape(*field.resolution, 4, 3)
 
     (ours, our_sh), (theirs, their_sh) = dense(layer), dense(field)
     ends = np.stack(np.unravel_index(layer.vertices[[0, -1]], field.resolution), axis=1)
@@ -231,7 +231,7 @@ def test_what_is_sent_of_a_layer_is_where_it_is_other_than_the_field() -> None:
     inside = np.zeros(field.resolution, bool)
     inside[block] = True
     assert not sent[~inside].any()
-    # Sent ones have the layer's numbers, to half a step; its colours may lie beyond the field's.
+    # Sent ones have the layer's numbers, to half a step; its colors may lie beyond the field's.
     np.testing.assert_allclose(density[sent] * unit, ours[sent], rtol=2.0**-10)
     wanted = np.clip(128 + our_sh / steps[:, None], 0, 255)
     assert np.abs(sh - wanted)[sent].max() <= 0.51

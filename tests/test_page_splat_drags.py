@@ -94,4 +94,4 @@ def test_views_of_splats_are_the_servers(pair: tuple[EditorPage, EditorPage], vi
         if view == "split":
             page.press("p")
         else:
-            page.page.click("[data-view=colour]")
+            page.page.click("[data-view=color]")

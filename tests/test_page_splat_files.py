@@ -16,7 +16,7 @@ from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.pages.page_splat_edits import decode_page_splat_edits, encode_page_splat_edits
 from cagefield.pages.page_splats import (
     CHUNK,
-    COLOUR_STEP,
+    COLOR_STEP,
     OFF,
     SH_STEP,
     decode_page_splats,
@@ -48,7 +48,7 @@ def test_numbers_come_back_to_half_a_step(degree: int, antialiased: bool) -> Non
     assert np.abs(turned).max() <= 4.0 * 0.5 * np.sqrt(2.0) / 4095 * np.sqrt(3.0)
     steps = np.maximum(np.abs(field.sh[:, 1:]).max(axis=(0, 2), initial=0.0) / 127.0, SH_STEP)
     off = np.abs(back.sh - field.sh[order]).max(axis=(0, 2))
-    assert off[0] <= 0.5001 * COLOUR_STEP and (off[1:] <= 0.5001 * steps).all()
+    assert off[0] <= 0.5001 * COLOR_STEP and (off[1:] <= 0.5001 * steps).all()
 
 
 def test_splats_far_away_cost_a_byte_and_not_their_place() -> None:

@@ -1,4 +1,4 @@
-"""Splats that a page draws with its own GPU, in headless Chromium, against the rasteriser's pictures."""
+"""Splats that a page draws with its own GPU, in headless Chromium, against the rasterizer's pictures."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from splat_rooms import LIGHT, cage, room
 from splat_scenes import ball_of_splats, random_splats
 
 LEAST = 40.0
-"""dB between the page's and the rasteriser's pictures: 8 bits alone are 59, and their two roundings 55."""
+"""dB between the page's and the rasterizer's pictures: 8 bits alone are 59, and their two roundings 55."""
 
 FILES = Path(__file__).resolve().parents[2] / "shared" / "data" / "splats"
 
@@ -53,7 +53,7 @@ def camera(width: int = 96, height: int = 72) -> Camera:
 
 
 def check_alike(ours: RenderResult | None, drawn: Drawn, least: float = LEAST) -> None:
-    """Colour, opacity and depth at least so many dB alike, and the picture not empty."""
+    """Color, opacity and depth at least so many dB alike, and the picture not empty."""
     assert ours is not None and ours.normals is not None
     solid = ours.opacity > 0.5
     assert solid.mean() > 0.05
@@ -68,7 +68,7 @@ def check_alike(ours: RenderResult | None, drawn: Drawn, least: float = LEAST) -
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2, 3, 4])
-def test_the_page_draws_what_the_rasteriser_draws(page: FieldPage, degree: int) -> None:
+def test_the_page_draws_what_the_rasterizer_draws(page: FieldPage, degree: int) -> None:
     field = splats(degree)
     page.load(encode_page_splats(field))
     check_alike(SplatRenderer(field).render(camera(), normals=True), page.draw(camera()), 45.0)
@@ -276,7 +276,7 @@ STACKS = {
 @pytest.mark.parametrize(
     ("name", "preserve_opacity"), [*((name, True) for name in STACKS), ("stretched", False)]
 )
-def test_the_page_draws_edits_as_the_rasteriser_does(
+def test_the_page_draws_edits_as_the_rasterizer_does(
     page: FieldPage, name: str, preserve_opacity: bool
 ) -> None:
     field, edits = splats(), EditStack(STACKS.get(name, [STRETCHED]))
@@ -291,7 +291,7 @@ def test_the_page_draws_edits_as_the_rasteriser_does(
     assert psnr(without.rgb, page.draw(camera()).rgb) >= 45.0
 
 
-def test_the_page_fills_and_relights_as_the_rasteriser_does(page: FieldPage) -> None:
+def test_the_page_fills_and_relights_as_the_rasterizer_does(page: FieldPage) -> None:
     field, edit = room(True), Edit.delete(cage())
     edits = PreparedStack([PreparedEdit(edit, build_splat_patch(field, EditStack(), edit, LIGHT))])
     ours, bare = (

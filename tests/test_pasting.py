@@ -97,7 +97,7 @@ def db(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
 
 @pytest.mark.parametrize(("scale", "kept"), [(1.0, True), (0.5, False), (1.4, True)])
 def test_a_paste_is_the_picture_of_a_scene_that_has_the_thing(folder: Path, scale: float, kept: bool) -> None:
-    """Scaled and turned, colours seen from where they are seen; baked voxels are 47 to 55 dB off."""
+    """Scaled and turned, colors seen from where they are seen; baked voxels are 47 to 55 dB off."""
     scene = replace(Scene.open(folder / "place"), preserve_opacity=kept)
     scene = scene.with_edits(EditStack([pasted(scale)]))
     far = np.array([[-2.0] * 3, [3.4] * 3])
@@ -204,7 +204,7 @@ def test_the_other_scene_is_pasted_as_it_is_edited(folder: Path, tmp_path: Path)
     assert db(pictures[0].rgb, pictures[1].rgb) > 32.0
 
 
-def test_degrees_of_colour_that_differ(folder: Path) -> None:
+def test_degrees_of_color_that_differ(folder: Path) -> None:
     """Of a flat scene there is no view dependence to show, into a flat one none is shown."""
     place = Scene.open(folder / "place")
     onto = replace(place, field=replace(place.field, sh=place.field.sh[:, :1]))
@@ -368,7 +368,7 @@ def test_points_of_the_own_field_stay() -> None:
     np.testing.assert_array_equal(mapped.points, points)
 
 
-def test_a_ball_of_one_colour_keeps_its_opacity(tmp_path: Path) -> None:
+def test_a_ball_of_one_color_keeps_its_opacity(tmp_path: Path) -> None:
     """Along the middle of a ball, the optical depth is that of the ball, whatever its size."""
     ball = AnalyticField([UniformSphere((0, 0, 0), 0.4, 2.0, (0.5, 0.5, 0.5))])
     Scene(bake(ball, 48, bounds=[[-0.5] * 3, [0.5] * 3], sh_degree=0)).save(tmp_path / "ball")

@@ -119,7 +119,7 @@ def test_a_paste_hides_nothing_and_its_cage_cuts(folder: Path) -> None:
 
 
 def test_a_page_has_what_is_pasted(folder: Path) -> None:
-    """The field's file holds its colours, without opacity; the edits' file shows it."""
+    """The field's file holds its colors, without opacity; the edits' file shows it."""
     scene = with_heap(folder, pasted())
     page = ScenePage.build(scene, "t")
     held = decode_page_splats(page.files["field"]).field

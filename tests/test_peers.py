@@ -96,7 +96,7 @@ def test_coordinates_are_a_partition_of_unity_that_interpolates(hollow: ClosedMe
 
 
 def test_centre_of_a_regular_mesh_gives_all_vertices_their_due() -> None:
-    """By symmetry the octahedron's centre is the mean of its vertices, the cube's mean of corners."""
+    """By symmetry the octahedron's center is the mean of its vertices, the cube's mean of corners."""
     vertices = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1.0]])
     triangles = []
     for x, y, z in product((0, 1), (2, 3), (4, 5)):
@@ -104,7 +104,7 @@ def test_centre_of_a_regular_mesh_gives_all_vertices_their_due() -> None:
         triangles.append(face if np.linalg.det(vertices[face]) > 0 else face[::-1])
     values = np.random.default_rng(2).normal(size=(6, 1))
     value, _ = ClosedMesh(vertices, np.array(triangles)).interpolate(values, np.array([[0.0, 0.0, 0.0]]))
-    assert value[0, 0] == pytest.approx(values.mean(), abs=1e-6)  # the centre lies in no face's plane
+    assert value[0, 0] == pytest.approx(values.mean(), abs=1e-6)  # the center lies in no face's plane
 
 
 def test_against_the_integral_over_the_sphere(hollow: ClosedMesh) -> None:

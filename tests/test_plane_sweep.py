@@ -40,7 +40,7 @@ def cameras(lens: str = "pinhole") -> list[Camera]:
 
 
 def painted(points: np.ndarray) -> np.ndarray:
-    """Colours [N,3] in [0,1] of places [N,2]: waves of many directions, some pixels long."""
+    """Colors [N,3] in [0,1] of places [N,2]: waves of many directions, some pixels long."""
     chance = np.random.default_rng(3)
     waves, phases = 9.0 * chance.normal(size=(2, 24)), chance.uniform(0, 6, 24)
     amounts = chance.normal(size=(24, 3)) * 0.09
@@ -81,7 +81,7 @@ def test_points_lie_on_the_plane_that_photos_show(lens):
     step = DISTANCE**2 / NEAR / 31
     assert np.median(np.abs(points[:, 2])) < 0.3 * step
     assert np.quantile(np.abs(points[:, 2]), 0.95) < step
-    # A pixel's colour is that of the plane where the point is: off by what a little depth moves it.
+    # A pixel's color is that of the plane where the point is: off by what a little depth moves it.
     assert np.median(np.abs(rgb / 255.0 - painted(points[:, :2]))) < 0.05
 
 
@@ -148,7 +148,7 @@ def test_points_are_thinned_evenly_to_about_as_many_as_wanted():
     np.testing.assert_allclose(shares[1], shares[0], atol=0.12)
 
 
-def test_neighbours_are_those_nearest_to_the_best_angle():
+def test_neighbors_are_those_nearest_to_the_best_angle():
     degrees = (0, 1, 4, 8, 12, 20, 50)
     views = [Camera.look_at(eye(d), (0, 0, 0), up=(0, 1, 0), width=72, height=56, fov_x=0.7) for d in degrees]
     chosen = choose_neighbors(views, [DISTANCE] * len(views))
@@ -158,7 +158,7 @@ def test_neighbours_are_those_nearest_to_the_best_angle():
     assert all(r not in row for r, row in enumerate(chosen))
 
 
-def test_cameras_that_are_much_farther_or_look_away_are_no_neighbours():
+def test_cameras_that_are_much_farther_or_look_away_are_no_neighbors():
     places = [eye(0), eye(8), eye(8, distance=3 * DISTANCE)]
     views = [Camera.look_at(p, (0, 0, 0), up=(0, 1, 0), width=72, height=56, fov_x=0.7) for p in places]
     views.append(Camera.look_at(eye(-8), eye(-8, distance=9.0), up=(0, 1, 0), width=72, height=56, fov_x=0.7))

@@ -226,7 +226,7 @@ def test_opacity_of_an_antialiased_edge_is_the_covered_share():
     np.testing.assert_allclose(frame.normals[:, :10], np.broadcast_to([0, -1, 0], (20, 10, 3)), atol=1e-4)
     np.testing.assert_allclose(frame.depth[:, :11], 199.5, atol=0.01)
     assert np.isinf(frame.depth[:, 11:]).all()
-    # straight colour: the edge column has the colour of the face, not a mixture with black
+    # straight color: the edge column has the color of the face, not a mixture with black
     np.testing.assert_allclose(frame.rgb[:, 10], frame.rgb[:, 9], atol=0.03)
 
 
@@ -262,7 +262,7 @@ def test_part_bounds_hold_what_is_traced(scene):
 
 
 def test_whole_scene_moved_looks_like_the_camera_moved(scene):
-    """Carried colours: a rigid motion of everything equals the inverse motion of the camera."""
+    """Carried colors: a rigid motion of everything equals the inverse motion of the camera."""
     camera = view(48, eye=(2.5, -2.6, 1.7), fov_x=0.7)
     motion = affine_matrix((0.1, -0.05, 0.08), (0.3, -0.2, 0.5))
     angles, offset = (0.3, -0.2, 0.5), (0.1, -0.05, 0.08)
@@ -276,8 +276,8 @@ def test_whole_scene_moved_looks_like_the_camera_moved(scene):
     assert np.abs(still.opacity - turned.opacity).mean() < 2e-3
 
 
-def test_translated_part_keeps_its_colours():
-    """Directional light: relit or not, a translation changes no colour."""
+def test_translated_part_keeps_its_colors():
+    """Directional light: relit or not, a translation changes no color."""
     ball = one(Sphere(0.4))
     offset = np.array([0.2, 0.3, -0.25])
     moved = ball.move("thing", translate=offset)
@@ -419,7 +419,7 @@ def test_really_moved_part_is_what_a_discrete_edit_makes(name, part, motion):
     points = rng.uniform(np.minimum(low, center - size), np.maximum(high, center + size), (30000, 3))
     viewdirs = rng.normal(size=points.shape)
     viewdirs /= np.linalg.norm(viewdirs, axis=1, keepdims=True)
-    # shells so thin that the neighbours' do not reach into the cage
+    # shells so thin that the neighbors' do not reach into the cage
     eps = 2e-4
     seen = EditStack([edit]).to_canonical(points, viewdirs)
     sigma, rgb = scene.field(eps)(seen.points, seen.viewdirs)

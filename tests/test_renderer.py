@@ -65,7 +65,7 @@ def test_uniform_density_obeys_beer_lambert():
     )
     camera = Camera.look_at((0, -4, 0), (0, 0, 0), width=5, height=5, fov_x=0.02)
     frame = VoxelRenderer(field, step=0.25).render(camera, background="black")
-    # Every ray passes 2 units; colour 0.5 everywhere. The last step may overhang by half a step of 1/16.
+    # Every ray passes 2 units; color 0.5 everywhere. The last step may overhang by half a step of 1/16.
     expected = 1 - np.exp(-0.7 * 2)
     np.testing.assert_allclose(frame.opacity, expected, atol=0.7 * np.exp(-1.4) / 16)
     np.testing.assert_allclose(frame.rgb, 0.5 * frame.opacity[..., None].repeat(3, -1), atol=1e-4)

@@ -67,7 +67,7 @@ def test_a_luminous_surface_sends_out_its_texture_times_its_factor():
 
 
 @pytest.mark.parametrize("name", ROOMS)
-def test_every_ray_ends_and_the_walls_are_smooth_but_not_of_one_colour(name):
+def test_every_ray_ends_and_the_walls_are_smooth_but_not_of_one_color(name):
     plan = capture(name)
     cameras = plan.cameras(plan.phone.resized(64), 5, 0)
     for camera in cameras:
@@ -134,7 +134,7 @@ def test_a_photo_is_linear_in_the_exposure_and_as_noisy_as_stated():
     pictures = [gray, np.full_like(gray, 0.7), np.full_like(gray, 0.5)]
     gains = exposure_gains(pictures, 1.0, rng)
     after = [decode_srgb(np.float64(p)).mean() * g.mean() for p, g in zip(pictures, gains, strict=True)]
-    # chance of .04 and colour of .012 are left
+    # chance of .04 and color of .012 are left
     assert np.ptp(np.log(after)) < 0.3
     assert np.exp(np.log(exposure_gains(pictures, 0.0, rng)).mean()) == pytest.approx(1.0, abs=0.05)
 

@@ -256,7 +256,7 @@ def test_render_agrees_with_the_exact_renderer() -> None:
     scene = ball_scene().with_edits(EditStack([lift]))
     camera = scene.cameras["test"][1]
     fused, exact = (scene.render(camera, exact=exact, normals=True) for exact in (False, True))
-    # Both take two samples a voxel, at different places: 2 grey levels on average, more at the silhouette.
+    # Both take two samples a voxel, at different places: 2 gray levels on average, more at the silhouette.
     assert np.abs(fused.rgb - exact.rgb).mean() < 0.008
     assert np.abs(fused.opacity - exact.opacity).max() < 0.15
     assert fused.normals is not None and fused.opacity.max() > 0.99

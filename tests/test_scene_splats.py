@@ -49,7 +49,7 @@ def test_kinds_that_scenes_do_not_hold_are_refused(tmp_path: Path) -> None:
         Scene.open(tmp_path / "scene")
 
 
-def test_pictures_are_the_rasterisers() -> None:
+def test_pictures_are_the_rasterizers() -> None:
     scene = splat_scene()
     camera = scene.cameras["test"][0]
     frame = scene.render(camera, normals=True)
@@ -114,7 +114,7 @@ def test_voxels_of_splats_show_what_the_splats_show() -> None:
         camera = camera.resized(240, 160)
         shown, expected = baked.render(camera), scene.render(camera)
         # A white picture scores 11 dB. Measured 33 dB, 27 at half the resolution and 35 at 160; the rest is
-        # the silhouette. (Pictures of a few pixels differ: every splat gets the rasteriser's filter there.)
+        # the silhouette. (Pictures of a few pixels differ: every splat gets the rasterizer's filter there.)
         assert psnr(np.clip(shown.rgb, 0, 1), np.clip(expected.rgb, 0, 1)) > 31.0
         assert shown.opacity.mean() == pytest.approx(expected.opacity.mean(), rel=0.02)
         # Single splats between which little is left stand in the way: some of the far side shines through.
@@ -139,7 +139,7 @@ def test_voxels_of_unbounded_splats_reach_beyond_their_box() -> None:
     assert baked.field.contracted
     camera = scene.cameras["test"][0].resized(240, 160)
     shown, expected = baked.render(camera), scene.render(camera)
-    # The wall around the ball, 8 away from the middle, is of the opposite colour.
+    # The wall around the ball, 8 away from the middle, is of the opposite color.
     corner = (slice(0, 40), slice(0, 40))
     assert np.median(expected.depth[corner]) > 8.0 and expected.opacity[corner].mean() > 0.9
     assert shown.opacity[corner].mean() > 0.9

@@ -293,7 +293,7 @@ PATCHED = {
 
 @pytest.fixture(scope="module")
 def shaded() -> Scene:
-    """A ball of small voxels, whose colours are said to follow its openness."""
+    """A ball of small voxels, whose colors are said to follow its openness."""
     field = ball_field(resolution=65)
     scene = Scene(field)
     scene.patcher.__dict__["light_model"] = LightModel(occlusion_radii(field), (0.1, 0.2, 0.2, 0.2, 0.2))
@@ -330,7 +330,7 @@ def test_edits_that_stay_keep_their_shadows_while_another_moves(shaded: Scene) -
     )
 
 
-@pytest.mark.parametrize("view", ["colour", "depth", "opacity", "normals"])
+@pytest.mark.parametrize("view", ["color", "depth", "opacity", "normals"])
 def test_a_part_over_the_last_picture_is_the_whole_picture(renderers: RendererCache, view: Any) -> None:
     before, after = STACKS["under another"]
     display = Display(view, split=0.55)

@@ -88,7 +88,7 @@ def picture(renderers: RendererCache, asked: PictureTask) -> np.ndarray[Any, Any
 
 def test_pictures_are_those_of_the_scene(renderers: RendererCache) -> None:
     frame = renderers.scene.with_edits(EditStack([MOVED])).render(CAMERA)
-    # JPEG at quality 95 with full-resolution colour: errors of a few levels.
+    # JPEG at quality 95 with full-resolution color: errors of a few levels.
     assert np.abs(picture(renderers, task(MOVED)) - frame.rgb8()).mean() < 2.0
 
 

@@ -406,18 +406,18 @@ def test_the_outer_margin_holds_the_inner_cage_before_and_after() -> None:
     np.testing.assert_allclose(outer.aabb, [[-0.3, -0.3, -0.3], [0.5, 0.3, 0.3]])
 
 
-def test_colours_stay_with_the_order_of_the_edits() -> None:
+def test_colors_stay_with_the_order_of_the_edits() -> None:
     s = session(ARM, CUP)
-    first = [entry.colour for entry in s.document.entries]
+    first = [entry.color for entry in s.document.entries]
     assert len(set(first)) == 2
     s.duplicate(1)
-    assert len({entry.colour for entry in s.document.entries}) == 3
+    assert len({entry.color for entry in s.document.entries}) == 3
     for _ in range(2):
         s.load_edits(dump_edits(EditStack([ARM, CUP])), append=False)
-        assert [entry.colour for entry in s.document.entries] == first
+        assert [entry.color for entry in s.document.entries] == first
     s.remove(s.document.entries[0].id)
     s.load_edits(dump_edits(EditStack([ARM])), append=True)
-    assert sorted(entry.colour for entry in s.document.entries) == sorted(first)
+    assert sorted(entry.color for entry in s.document.entries) == sorted(first)
 
 
 def test_edit_texts_go_out_and_come_in() -> None:

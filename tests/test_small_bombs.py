@@ -50,7 +50,7 @@ def test_a_grid_that_holds_next_to_nothing_is_refused(tmp_path: Path) -> None:
 
 
 def _png(width: int, height: int) -> bytes:
-    """A grey picture of zeros, a thousandth of its size."""
+    """A gray picture of zeros, a thousandth of its size."""
 
     def chunk(kind: bytes, content: bytes) -> bytes:
         code = struct.pack(">I", zlib.crc32(kind + content))

@@ -93,7 +93,7 @@ def test_dilogarithm_is_scipys() -> None:
 
 
 def test_representatives_keep_the_moments() -> None:
-    """Against sums in float64: mean, covariance and colour of each group, its optical depth."""
+    """Against sums in float64: mean, covariance and color of each group, its optical depth."""
     splats = many(2000)
     clusters = Clusters.build(splats)
     fine, coarse = clusters.levels
@@ -157,7 +157,7 @@ def test_representatives_where_groups_lie_within_a_pixel() -> None:
     assert len(few.order) < 0.2 * len(plain.order)
     got, want = few.picture(DEPTH), plain.picture(DEPTH)
     error = -10.0 * np.log10(np.mean(np.square(got[..., :4] - want[..., :4])))
-    # One colour, so that what remains is the outline: representatives are a little wider than their splats.
+    # One color, so that what remains is the outline: representatives are a little wider than their splats.
     assert error > 28.0
     assert abs(got[..., 0].mean() - want[..., 0].mean()) < 1e-2
 

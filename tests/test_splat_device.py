@@ -1,4 +1,4 @@
-"""The device's splat rasteriser: on whichever device runs here, against the same oracle as the CPU's."""
+"""The device's splat rasterizer: on whichever device runs here, against the same oracle as the CPU's."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_values_that_are_extreme_but_finite_leave_no_nan() -> None:
 
 
 def test_a_gpu_draws_the_renderers_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """SplatRenderer takes the device's rasteriser where a GPU runs, edited or not."""
+    """SplatRenderer takes the device's rasterizer where a GPU runs, edited or not."""
     field = random_splats(200)
     inner = Cage.box((0, 0, 0), 0.6)
     edits = EditStack([Edit.move(inner).translate((0.6, 0.4, 0.0))])

@@ -24,7 +24,7 @@ from cagefield.typing import AnyArray
 
 
 def disc(size: float, turn: float) -> SplatField:
-    """One disc at the origin, `size` and half of it wide, turned about x; opacity .8, grey of .5."""
+    """One disc at the origin, `size` and half of it wide, turned about x; opacity .8, gray of .5."""
     return SplatField(
         np.zeros((1, 3)), np.log([[size, 0.5 * size, 1e-3 * size]]),
         [[np.cos(turn / 2), np.sin(turn / 2), 0, 0]], [0.8], np.zeros((1, 1, 3)),

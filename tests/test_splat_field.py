@@ -19,7 +19,7 @@ def test_files_hold_everything(tmp_path: Path, degree: int) -> None:
     field = replace(random_splats(degree=degree), antialiased=True, bounds=box, unbounded=True)
     field.save(tmp_path / "field.safetensors")
     read = SplatField.load(tmp_path / "field.safetensors")
-    # Quaternions are normalised again.
+    # Quaternions are normalized again.
     assert_same_splats(read, field, atol=1e-7)
     np.testing.assert_array_equal(read.bounds, box)
     assert read.unbounded and read.sh_degree == degree

@@ -48,7 +48,7 @@ BALL = ball_field(density=200.0, resolution=33)
 def picture(
     depth: float | np.ndarray, opacity: float | np.ndarray, shape: tuple[int, int] = (8, 8)
 ) -> RenderResult:
-    """A grey picture of depths and opacities, its normals along z."""
+    """A gray picture of depths and opacities, its normals along z."""
     normals = np.broadcast_to((0.0, 0.0, 1.0), (*shape, 3))
     gray = np.full((*shape, 3), 0.5)
     return RenderResult(gray, np.broadcast_to(opacity, shape), np.broadcast_to(depth, shape), normals)
@@ -74,7 +74,7 @@ def test_the_surface_that_cameras_see_is_the_balls() -> None:
     outwards = surface.positions / distance[:, None]
     # The ball is a staircase of edges an eighth of its radius long.
     assert np.einsum("ni,ni->n", surface.normals, outwards).mean() > 0.9
-    # Colours fade to grey in the edge outside, where the field stores nothing; their hue stays.
+    # Colors fade to gray in the edge outside, where the field stores nothing; their hue stays.
     share = (surface.rgb[:, :1] - 0.5) / 0.4
     np.testing.assert_allclose(surface.rgb - 0.5, share * (0.4, -0.3, -0.4), atol=1e-3)
     assert share.min() > 0.0
@@ -88,7 +88,7 @@ def test_pixels_at_a_step_in_depth_are_on_no_surface() -> None:
     slope = 2.0 + np.arange(8) * (0.4 * MIN_DEPTH_STEP_PIXELS * pixel)
     step = np.where(np.arange(8) < 4, 2.0, 2.0 + 2.0 * MIN_DEPTH_STEP_PIXELS * pixel)
     assert len(SurfacePoints.from_render(picture(slope[None], 1.0), camera)) == 64
-    # A column on each side has the step among its neighbours.
+    # A column on each side has the step among its neighbors.
     assert len(SurfacePoints.from_render(picture(step[None], 1.0), camera)) == 48
     # Next to nothing at all there is no step.
     assert (

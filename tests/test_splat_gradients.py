@@ -1,7 +1,7 @@
 """Gradients and curvatures of all parameters of splats against finite differences of the float64 oracle.
 
 The loss is L = |picture over a background - target|^2 / 2, summed over pixels and channels. A splat's opacity
-changes what the background shows, so the background is in the colour that the kernels get.
+changes what the background shows, so the background is in the color that the kernels get.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def test_gradients_are_those_of_the_oracle(lens: str, antialiased: bool, degree:
             ]
         )
         got = gradients[drawn, first : first + count].copy()
-        if name == "colour":
+        if name == "color":
             # Before the clamp at 0, as `chain` says: where it holds, the oracle's is 0.
             held = np.abs(want) < 1e-12
             assert held.any()

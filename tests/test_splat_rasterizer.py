@@ -1,4 +1,4 @@
-"""The splat rasteriser against its float64 oracle, closed forms, and itself."""
+"""The splat rasterizer against its float64 oracle, closed forms, and itself."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def db(error: NDArray) -> float:
 
 
 def expected(splats: DeformedSplats, view) -> NDArray:
-    """The oracle's picture [H,W,5]: T, colour, depth times weight."""
+    """The oracle's picture [H,W,5]: T, color, depth times weight."""
     seen = reference.project(splats, view, NEAR, intrinsics(view).limits)
     color, through, depth = reference.blend(seen, view.width, view.height)
     return np.concatenate([through[..., None], color, depth[..., None]], axis=-1)
@@ -60,7 +60,7 @@ def test_pictures_of_all_kinds_of_splats(lens: str, antialiased: bool, size: tup
 
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("degree", range(harmonics.MAX_DEGREE + 1))
-def test_colours_of_each_degree_and_of_turned_splats(degree: int, turned: bool) -> None:
+def test_colors_of_each_degree_and_of_turned_splats(degree: int, turned: bool) -> None:
     view = camera()
     splats = all_kinds(view.origin, degree, turned=turned)
     got = assert_agrees(splats, view)

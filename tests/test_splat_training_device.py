@@ -91,7 +91,7 @@ def test_gradients_are_those_of_the_oracle(lens: str, antialiased: bool) -> None
             ]
         )
         got = gradients[drawn, first : first + count].copy()
-        if name == "colour":
+        if name == "color":
             # Gradients are before the clamp at 0; the oracle's are 0 there.
             held = np.abs(want) < 1e-12
             assert held.any()

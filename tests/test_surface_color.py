@@ -20,7 +20,7 @@ VERTICES, TOP = 24, 12
 
 
 def ground(seed: int = 0) -> GridBlock:
-    """Foggy ground up to height TOP, grey 0.2 on the whole, each vertex with noise of its own."""
+    """Foggy ground up to height TOP, gray 0.2 on the whole, each vertex with noise of its own."""
     shape = (VERTICES,) * 3
     z = np.broadcast_to(np.arange(VERTICES), shape)
     vertices = np.flatnonzero(z <= TOP + 1)
@@ -65,7 +65,7 @@ def test_light_that_grows_brings_no_noise_out():
     assert abs(after.mean() - before.mean()) < 0.02
 
 
-def test_light_that_stays_or_fades_changes_no_colour():
+def test_light_that_stays_or_fades_changes_no_color():
     block = ground()
     where = inner(block)
     for log in (-1.0, 0.0, MIN_DENOISED_LOG_GAIN):

@@ -197,7 +197,7 @@ def test_a_rigid_motion_leaves_a_parts_shade_on_itself() -> None:
 
 
 def test_stacked_edits_keep_densities_below_zero() -> None:
-    """They make the surfaces beside them sharp, and their colours show there."""
+    """They make the surfaces beside them sharp, and their colors show there."""
     field = slab(sharp=True)
     moved = Edit.move(Cage.box((0.0, 0.0, 0.5), 0.5)).translate((0.3, 0.1, 0.2))
     block = extract_block(field, EditStack([moved]), np.array([[-0.1, -0.3, 0.3], [0.7, 0.5, 0.95]]))

@@ -52,7 +52,7 @@ def trained(dataset):
 def test_it_learns_views_it_has_not_seen(trained):
     assert trained.finished
     assert trained.steps == 150
-    # A white picture scores about 12 dB on this scene, a grey silhouette about 17.
+    # A white picture scores about 12 dB on this scene, a gray silhouette about 17.
     assert trained.test_psnr > 21
     assert trained.test_ssim > 0.75
     assert trained.train_psnr > trained.test_psnr - 1

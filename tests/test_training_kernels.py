@@ -89,7 +89,7 @@ def marched(
     distortion: float = 0.0,
     lists: SampleListArgs | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Runs one batch of all pixels; returns the losses [R] and the squared colours [R,3] of the rays.
+    """Runs one batch of all pixels; returns the losses [R] and the squared colors [R,3] of the rays.
 
     With lists of samples as on a GPU.
     """
@@ -176,7 +176,7 @@ def test_gradients_match_finite_differences(tmp_path, degree, contracted):
             errors.append(difference - gradient)
             sizes.append(difference)
         # Samples of weight under 1e-4 and rays past T = 1e-3 are left out of both; what moves across those
-        # thresholds, and colours that start to clip, stay under 2 percent.
+        # thresholds, and colors that start to clip, stay under 2 percent.
         assert np.linalg.norm(errors) < 0.02 * np.linalg.norm(sizes), name
 
 
@@ -191,7 +191,7 @@ def test_curvatures_bound_how_all_voxels_together_change_the_pictures(tmp_path, 
     records = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, -1).sum(axis=0).astype(float)
     assert (records[:, 1:3] >= 0).all()
     assert records[0].max() == 0.0  # the empty slot gets nothing
-    # A colour of degree 0 is Y_0 c: its curvature is that of Y_0 c.
+    # A color of degree 0 is Y_0 c: its curvature is that of Y_0 c.
     bounds = records[:, 1] if name == "density" else records[:, 2] * 0.28209479**2
     array, cell = getattr(grid, name), float(grid.cell.to_numpy()[1])
     values = array.to_numpy()
@@ -200,7 +200,7 @@ def test_curvatures_bound_how_all_voxels_together_change_the_pictures(tmp_path, 
     for direction in (np.ones(grid.slots), rng.choice([-1.0, 1.0], grid.slots), rng.normal(size=grid.slots)):
         direction[0] = 0.0  # the empty slot stays empty
         e = 0.01 / cell if name == "density" else 0.01
-        # One channel of the colours; the density moves all three.
+        # One channel of the colors; the density moves all three.
         move = direction if name == "density" else np.outer(direction, [1.0, 0.0, 0.0]).ravel()
         pictures = []
         for sign in (1, -1):
@@ -211,7 +211,7 @@ def test_curvatures_bound_how_all_voxels_together_change_the_pictures(tmp_path, 
         ratios.append(change / (bounds * direction**2).sum())
     # 1 % for the differences' own error.
     assert max(ratios) < 1.01
-    # Not far too large either: where all colours move alike, only vertices that are not stored are missing.
+    # Not far too large either: where all colors move alike, only vertices that are not stored are missing.
     if name == "sh":
         assert ratios[0] > 0.6
 
@@ -305,7 +305,7 @@ def test_gauss_newton_step_is_gradient_over_damped_curvature(tmp_path):
     assert not grid.accumulator.to_numpy().any()
 
 
-def test_laplacian_is_the_gradient_of_neighbour_differences(tmp_path):
+def test_laplacian_is_the_gradient_of_neighbor_differences(tmp_path):
     data, grid = photos(tmp_path), state(1, False)
     march(grid, data, np.ones((3, 3)))
     reduced(grid)

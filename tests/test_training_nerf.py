@@ -50,7 +50,7 @@ def test_it_learns(photos) -> None:
     before = train_nerf(dataset, tiny(steps=1))
     after = train_nerf(dataset, tiny(steps=400))
     assert after.finished and after.steps == 400
-    # an untrained network shows grey fog in the box around the scene; 400 steps find the shape
+    # an untrained network shows gray fog in the box around the scene; 400 steps find the shape
     assert after.train_psnr > before.train_psnr + 3.0
     assert after.test_psnr > before.test_psnr + 2.0
 
@@ -116,7 +116,7 @@ def test_warm_up_rays_come_from_the_middle(photos) -> None:
     assert early > quarter - 1e-3
 
 
-def test_targets_are_the_photos_colours_on_white(photos) -> None:
+def test_targets_are_the_photos_colors_on_white(photos) -> None:
     dataset = load_dataset(photos)
     run = NerfRun(dataset, tiny(batch_rays=50))
     rays, target = run.next_batch()

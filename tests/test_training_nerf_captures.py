@@ -56,7 +56,7 @@ def tiny(**options) -> NerfConfig:
 
 
 def flat_psnr(dataset: Dataset) -> float:
-    """PSNR of the test photos against the mean colour of the training photos: a picture without content."""
+    """PSNR of the test photos against the mean color of the training photos: a picture without content."""
     color = np.concatenate([view.load().reshape(-1, 3) for view in dataset.train]).mean(axis=0) / 255
     return float(np.mean([-10 * np.log10(((v.load() / 255 - color) ** 2).mean()) for v in dataset.test]))
 

@@ -55,7 +55,7 @@ def trained(capture):
 
 
 def plain_capture(folder, color, size=32, count=6, points=None) -> Dataset:
-    """Photos of one colour, of 3 or 4 channels."""
+    """Photos of one color, of 3 or 4 channels."""
     cameras = around(count, 0.3, size)
     photos = [np.full((size, size, len(color)), color, np.uint8) for _ in cameras]
     return as_dataset(folder, write_views(folder, cameras, photos), points=points, white=len(color) == 4)

@@ -15,7 +15,7 @@ BOUNDS = np.array([[-1.0, -0.5, 0.0], [1.0, 0.5, 2.0]])
 
 
 def linear_field(degree: int = 1, contracted: bool = False) -> VoxelField:
-    """Density 3 + x + 2y - z and colour coefficients linear in position: interpolation is exact on them."""
+    """Density 3 + x + 2y - z and color coefficients linear in position: interpolation is exact on them."""
     n = (5, 4, 6)
     bounds = np.array([[-1.0] * 3, [1.0] * 3]) if contracted else BOUNDS
     grid = np.array([[-2.0] * 3, [2.0] * 3]) if contracted else bounds

@@ -36,7 +36,7 @@ def grid() -> np.ndarray:
 
 
 def field_of(density: np.ndarray, color: np.ndarray, degree: int = 1) -> VoxelField:
-    """The field with density [N,N,N] and the same colour coefficients [N,N,N,3] in all directions."""
+    """The field with density [N,N,N] and the same color coefficients [N,N,N,3] in all directions."""
     vertices = np.flatnonzero(density.reshape(-1) > 0)
     sh = np.zeros((len(vertices), (degree + 1) ** 2, 3), np.float32)
     sh[:, 0] = color.reshape(-1, 3)[vertices]
@@ -44,7 +44,7 @@ def field_of(density: np.ndarray, color: np.ndarray, degree: int = 1) -> VoxelFi
 
 
 def dense(field: VoxelField) -> tuple[np.ndarray, np.ndarray]:
-    """(density [N,N,N], constant colour coefficients [N,N,N,3])."""
+    """(density [N,N,N], constant color coefficients [N,N,N,3])."""
     density, color = np.zeros(N**3, np.float32), np.zeros((N**3, 3), np.float32)
     density[field.vertices], color[field.vertices] = field.density, field.sh[:, 0]
     return density.reshape(N, N, N), color.reshape(N, N, N, 3)
@@ -84,7 +84,7 @@ def test_all_is_unseen_from_a_camera_that_looks_away() -> None:
 
 @pytest.fixture(scope="module")
 def ball() -> tuple[VoxelField, np.ndarray]:
-    """A ball, hollow as a trained one, and what is unseen of it: its colour runs from red to blue along x."""
+    """A ball, hollow as a trained one, and what is unseen of it: its color runs from red to blue along x."""
     p = grid()
     r = np.linalg.norm(p, axis=-1)
     density = np.where((r < 0.7) & (r > 0.55), 3.0 / VOXEL, 0.0).astype(np.float32)
@@ -97,9 +97,9 @@ def ball() -> tuple[VoxelField, np.ndarray]:
 def test_what_was_seen_stays_and_photos_show_the_same(ball) -> None:
     field, hidden = ball
     after = fill_unseen(field, hidden)
-    (before_density, before_colour), (density, color) = dense(field), dense(after)
+    (before_density, before_color), (density, color) = dense(field), dense(after)
     np.testing.assert_array_equal(density[~hidden], before_density[~hidden])
-    np.testing.assert_array_equal(color[~hidden], before_colour[~hidden])
+    np.testing.assert_array_equal(color[~hidden], before_color[~hidden])
     for camera in ring(3):
         one, two = (
             np.asarray(VoxelRenderer(f).render(camera, background="white").rgb) for f in (field, after)
@@ -124,7 +124,7 @@ def test_it_is_opaque_to_its_depth_and_no_deeper(ball) -> None:
     assert (density[far] == 0).all()
 
 
-def test_colours_go_on_from_the_surfaces_and_stay_between_them(ball) -> None:
+def test_colors_go_on_from_the_surfaces_and_stay_between_them(ball) -> None:
     field, hidden = ball
     after = fill_unseen(field, hidden)
     density, color = dense(after)
@@ -161,7 +161,7 @@ def test_under_a_block_the_ground_goes_on() -> None:
     assert green.mean() > 0.7
 
 
-def test_colours_stay_between_the_surfaces_where_the_solver_runs_out_of_steps(
+def test_colors_stay_between_the_surfaces_where_the_solver_runs_out_of_steps(
     ball, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     field, hidden = ball
@@ -179,7 +179,7 @@ def test_colours_stay_between_the_surfaces_where_the_solver_runs_out_of_steps(
     color, given = short.sh[at, 0], field.sh[:, 0]
     assert (color >= given.min(axis=0) - 1e-6).all() and (color <= given.max(axis=0) + 1e-6).all()
     assert not np.array_equal(color, whole.sh[at, 0])
-    # It is the surfaces' colours, not grey: as they run, red comes with x and blue goes.
+    # It is the surfaces' colors, not gray: as they run, red comes with x and blue goes.
     x = grid().reshape(-1, 3)[whole.vertices[at], 0]
     assert color[x > 0.3, 0].min() > 0.25 and color[x < -0.3, 0].max() < -0.25
 
@@ -215,10 +215,10 @@ def test_the_bound_on_the_steps_holds_where_the_system_is_hardest(monkeypatch: p
 def test_a_solution_cut_short_mixes_its_sources_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
     pull, diagonal = block()
     source = np.zeros((len(diagonal), 2))
-    source[0], source[-1] = (1.0, 1.0), (1.0, 0.0)  # weights, and weights times colours 1 and 0
+    source[0], source[-1] = (1.0, 1.0), (1.0, 0.0)  # weights, and weights times colors 1 and 0
     monkeypatch.setattr(inpainting, "MAX_SOLVER_STEPS", 40)
     weight, color = inpainting.solve_diffusion(pull, diagonal, source).T
-    # The corners are 45 voxels apart; 40 steps of conjugate gradients stop short with a colour of 1.00005.
+    # The corners are 45 voxels apart; 40 steps of conjugate gradients stop short with a color of 1.00005.
     assert (weight > 0).all()
     assert (color >= 0).all() and (color <= weight).all()
     assert color[0] > 0.99 * weight[0] and color[-1] < 0.01 * weight[-1]

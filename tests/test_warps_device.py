@@ -28,7 +28,7 @@ def samples(n: int = 20_000, reach: float = 1.1, seed: int = 0) -> tuple[np.ndar
 
 
 def off_faces(stack: EditStack, p: np.ndarray, margin: float = 1e-4) -> np.ndarray:
-    """Samples that all their neighbours at distance `margin` map with the same Jacobian, up to curvature.
+    """Samples that all their neighbors at distance `margin` map with the same Jacobian, up to curvature.
 
     The others are near a face, where J jumps, and a float32 may take either side.
     """

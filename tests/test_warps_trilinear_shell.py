@@ -99,7 +99,7 @@ def test_continuous_across_every_face(edit: Edit, seed: int) -> None:
         expected[side == n] = hexahedron.points(shell.canonical_hexahedra[n], u[side == n])
     tolerance = 1e-11 * (1.0 + conditioning(shell, u, side))
     # On the face itself, whichever of its two hexahedra is chosen, and a hair on either side (where the
-    # hexahedron is the neighbour, whose conditioning may be worse).
+    # hexahedron is the neighbor, whose conditioning may be worse).
     q, _ = shell.to_canonical(np.concatenate([p, p + 1e-12, p - 1e-12]))
     errors = np.abs(q.reshape(3, -1, 3) - expected).max(axis=2)
     assert (errors[0] < tolerance).all() and (errors[1:] < tolerance.max()).all()
@@ -119,7 +119,7 @@ def test_jacobian_against_finite_differences(edit: Edit, seed: int) -> None:
     deformed, _, u, side = sampled(shell, seed)
     amplified = conditioning(shell, u, side)
     h = 1e-5
-    # Only points whose neighbours at distance h are in the same hexahedron: J jumps from one to the next.
+    # Only points whose neighbors at distance h are in the same hexahedron: J jumps from one to the next.
     deep = (np.minimum(u, 1.0 - u).min(axis=1) > 0.05) & (amplified < 30.0)
     assume(deep.any())
     p = deformed[deep]

@@ -30,7 +30,7 @@ _CHUNK = 1 << 19
 class Learnt:
     """A trained field: its kind, its number of splats or voxels, how long it took, and its pictures.
 
-    `opacity_before(camera, pixels, distances)` is the opacity [K] gathered along the rays through the centres
+    `opacity_before(camera, pixels, distances)` is the opacity [K] gathered along the rays through the centers
     of pixels [K,2] (column, row) before distances [K]; `edited(edits)` shows the field under an edit stack.
     """
 

@@ -27,7 +27,7 @@ def unseen_pixels(
     """Pixels [H,W] of `moved` whose surface none of the photos of `photographed` showed.
 
     `moved` was made from `photographed` by moving, copying or removing parts; the ray through each pixel's
-    centre is followed to its surface, and that point of its part back to where the photos were taken. A photo
+    center is followed to its surface, and that point of its part back to where the photos were taken. A photo
     shows it where its ray comes to REACH above it.
     Only pixels of the mask `where` [H,W] are tested; others, and those without a surface, are False.
     """
@@ -66,7 +66,7 @@ def unseen_pixels(
 def uncovered_pixels(moved: ProceduralScene, camera: Camera, before: ProceduralScene) -> Mask:
     """Pixels [H,W] of `moved` that show a surface which a part hid in `before` that was moved or removed.
 
-    The ray through the pixel's centre met that part, and now meets another.
+    The ray through the pixel's center met that part, and now meets another.
     """
     known = {part.name: part for part in moved.parts}
     gone = {

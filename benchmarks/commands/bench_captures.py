@@ -41,7 +41,7 @@ class BenchCaptures:
     resolution: int = 256
     """Voxels along the longest axis."""
     sh_degree: int | None = None
-    """Degree of the colour's spherical harmonics; left out, the trainer's own."""
+    """Degree of the color's spherical harmonics; left out, the trainer's own."""
     seed: int = 0
     """Of the training."""
     downscale: int | None = None

@@ -40,7 +40,7 @@ _COSTS = ("frame time", "min det J", "max stretch", "map time")
 _LPIPS, _NAIVE = ("LPIPS unedited", "LPIPS edited"), tuple(f"lost, {way}" for way in NAIVE)
 _NAIVELY = (
     "Lost, means only: each splat moved with its mean, no more; no turned SH: its covariance follows the map "
-    "too, its colours do not turn; not split: all but the splitting of splats that an edit bends or cuts."
+    "too, its colors do not turn; not split: all but the splitting of splats that an edit bends or cuts."
 )
 _SHOWN = (
     "scene", "edit", "PSNR unedited", "PSNR edited", "PSNR lost", "there lost", "there lost, old shadows",

@@ -5,7 +5,7 @@ space meets a surface where the scene's distance D(phi(p(t))) is 0. Outside the 
 are traced as they are; inside, from t a step of D / |J d| stays in the empty ball of radius D about phi(p(t))
 as long as phi is about linear: a step whose end is outside that ball is taken back and shortened, down to
 SHORTEST, where the map jumps; so is one that ends beyond what the map empties. None goes past a face of the
-boxes of what phi changes, in which a thin copy may stand. Surfaces have the colours of
+boxes of what phi changes, in which a thin copy may stand. Surfaces have the colors of
 their canonical points in direction J d.
 Source: Hart, "Sphere tracing" (1996), whose step is divided by the map's stretch.
 """

@@ -23,7 +23,7 @@ from cagefield.scene.scene import Scene
 from cagefield.typing import AnyArray, Float32
 
 NAIVE = ("means only", "no turned SH", "not split")
-"""Means alone; means and covariances, colours unturned; everything but splitting."""
+"""Means alone; means and covariances, colors unturned; everything but splitting."""
 
 
 def naive_splats(field: SplatField, edits: EditStack) -> Iterator[tuple[str, DeformedSplats]]:

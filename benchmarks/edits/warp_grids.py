@@ -22,7 +22,7 @@ from cagefield.typing import Array, UInt8
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.trilinear_shell import TrilinearShell
 
-Colour = tuple[int, int, int]
+Color = tuple[int, int, int]
 
 INNER, OUTER, VIEW = 0.3, 0.8, 0.86
 """Half-sizes of the two concentric boxes, and of the picture of them."""
@@ -89,7 +89,7 @@ def lattice_picture(warp: BackwardMap, edit: Continuous, side: int, spacing: flo
 
 
 def _plane(side: int) -> Array:
-    """Pixel centres [side^2, 3] of the plane z = 0, row by row from above."""
+    """Pixel centers [side^2, 3] of the plane z = 0, row by row from above."""
     g = VIEW * (2.0 * (np.arange(side) + 0.5) / side - 1.0)
     y, x = np.meshgrid(g[::-1], g, indexing="ij")
     return np.stack([x.ravel(), y.ravel(), np.zeros(side * side)], axis=1)
@@ -175,7 +175,7 @@ def _text(
     at: tuple[float, float],
     text: str,
     size: int,
-    color: Colour = _INK,
+    color: Color = _INK,
     anchor: str = "mm",
 ) -> None:
     font = ImageFont.load_default(size * _FINE)

@@ -82,7 +82,7 @@ def _read_capture(folder: Path) -> None:
 
 
 def _make_llff(count: int, folder: Path) -> None:
-    """Of the room where nine photos are enough, else of grey ones."""
+    """Of the room where nine photos are enough, else of gray ones."""
     if count == 9:
         room_capture(folder / "capture")
         return

@@ -218,5 +218,5 @@ class Visit:
 
     def show(self) -> None:
         """Other views."""
-        view = self.chance.choice(["colour", "depth", "normals"])
+        view = self.chance.choice(["color", "depth", "normals"])
         self.client.send("display", view=view, before=self.chance.random() < 0.2)

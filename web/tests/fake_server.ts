@@ -7,7 +7,7 @@ export function edit(change: Partial<EditState> = {}): EditState {
   return {
     id: 1,
     name: "edit 1",
-    colour: "#4cc2ff",
+    color: "#4cc2ff",
     enabled: true,
     locked: false,
     kind: "continuous",

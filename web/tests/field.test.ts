@@ -85,7 +85,7 @@ describe("bricks in textures", () => {
         expect(layer.colors[0][4 * at(x, y, z)]).toBe(value & 255);
         expect(layer.colors[0][4 * at(x, y, z) + 1]).toBe(7);
       }
-      // Beyond the grid there is nothing: grey without density.
+      // Beyond the grid there is nothing: gray without density.
       if (n === 1) expect([layer.density[at(5, 0, 0)], layer.colors[0][4 * at(5, 0, 0)]]).toEqual([0, 128]);
       else expect(layer.density[at(8, 1, 1)]).toBe(811);
     }

@@ -10,7 +10,7 @@ export const PICTURE: PictureHeader = {
   drag: 0,
   seq: 0,
   revision: 1,
-  view: "colour",
+  view: "color",
   before: false,
   split: null,
   x: 0,

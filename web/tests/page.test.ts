@@ -174,7 +174,7 @@ describe("what is drawn", () => {
   });
 
   it("has the other edits in their colors, hidden ones not, and nothing where cages are off or a page plays", () => {
-    const edits = [edit(), edit({ id: 2, colour: "#ff0000" }), edit({ id: 3, enabled: false })];
+    const edits = [edit(), edit({ id: 2, color: "#ff0000" }), edit({ id: 3, enabled: false })];
     const { segments } = cageOverlay({ ...INITIAL, state: state({ edits }) }, null, [], eye, forward);
     expect(segments).toHaveLength(48);
     expect(segments.filter(({ srgbColor: color }) => color.r > 0.99 && color.g < 0.01)).toHaveLength(24);

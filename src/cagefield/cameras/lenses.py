@@ -34,7 +34,7 @@ _MAX_PLANE_RADIUS = 1e3  # largest |(X/Z, Y/Z)| of an opencv lens: 89.94 degrees
 
 
 def project(directions: Array, model: Lens, coefficients: Sequence[float] = ()) -> Array:
-    """Normalised image points [N,2] of camera-space `directions` [N,3] of any length.
+    """Normalized image points [N,2] of camera-space `directions` [N,3] of any length.
 
     NaN where a direction has no image: on or behind the plane of a pinhole or opencv lens, straight backwards
     for a fisheye, and beyond the radius where the distortion polynomial folds.

@@ -359,7 +359,7 @@ class Export:
             mesh, offset = transform_mesh(mesh, world_to_aligned(scene))
         write_mesh(self.out, mesh, up, offset=offset)
         aligned = "" if self.source_coordinates else _aligned(scene)
-        return f"{len(mesh.faces)} triangles, {len(mesh.positions)} vertices with colours{aligned}"
+        return f"{len(mesh.faces)} triangles, {len(mesh.positions)} vertices with colors{aligned}"
 
     def _points(self, scene: Scene, cages: tuple[Cage, ...]) -> str:
         """Writes points; a line of figures."""
@@ -380,7 +380,7 @@ class Export:
             points, offset = transform_points(points, world_to_aligned(scene))
         write_points(self.out, points.positions, points.rgb, points.normals, offset=offset)
         aligned = "" if self.source_coordinates else _aligned(scene)
-        return f"{len(points)} points with normals and colours{aligned}"
+        return f"{len(points)} points with normals and colors{aligned}"
 
 
 def _aligned(scene: Scene) -> str:

@@ -51,7 +51,7 @@ class Info:
         size = " x ".join(f"{edge:.4g}" for edge in field.bounds[1] - field.bounds[0])
         print(f"field       {content}")
         print(f"            {kind} {size} around {_point(field.center)}")
-        print(f"            {details}, colour SH degree {field.sh_degree}")
+        print(f"            {details}, color SH degree {field.sh_degree}")
         if scene.removal is not None:
             deleted = scene.removal.selection
             noun = "splats" if isinstance(field, SplatField) else "cells"

@@ -53,7 +53,7 @@ class TrainingOptions:
     resolution: int | None = None
     """Voxels along the longest axis at the end; left out, as many as the photos' size and the time allow."""
     sh_degree: int | None = None
-    """Degree of the colour's spherical harmonics, 0 to 2, of splats to 3: how much it changes with the view;
+    """Degree of the color's spherical harmonics, 0 to 2, of splats to 3: how much it changes with the view;
     left out, 2, and 1 for voxels trained on an unbounded capture."""
     seed: int = 0
     """Of the order of the photos' pixels and of all other chance."""
@@ -96,7 +96,7 @@ class BakingOptions:
     resolution: int = 256
     """Voxels along the longest axis of the field's content."""
     sh_degree: int = 2
-    """Degree of the colour's spherical harmonics, 0 to 2: how much it changes with the view."""
+    """Degree of the color's spherical harmonics, 0 to 2: how much it changes with the view."""
     compare: int = 3
     """Views in which the voxels are compared with the original field; 0 leaves that out."""
 
@@ -146,7 +146,7 @@ def parse_background(text: str | None) -> str | tuple[float, float, float]:
         red, green, blue = (float(part) for part in text.split(","))
     except ValueError:
         raise CagefieldError(
-            f"--background {text!r} is no colour; give white, black, none, or r,g,b from 0 to 1 (0.2,0.4,1)"
+            f"--background {text!r} is no color; give white, black, none, or r,g,b from 0 to 1 (0.2,0.4,1)"
         ) from None
     return red, green, blue
 

@@ -211,7 +211,7 @@ class Render:
         background = parse_background(self.background)
         if background == "none" and (self.compare or self.out.suffix.lower() == ".mp4"):
             raise CagefieldError(
-                "--background none makes transparent PNGs; give a colour for --compare or a video"
+                "--background none makes transparent PNGs; give a color for --compare or a video"
             )
 
     def _cameras(self, scene: Scene) -> tuple[list[Camera], float]:

@@ -75,7 +75,7 @@ class Train:
     preset: Preset = "auto"
     """Networks of --field nerf: the paper's 8 x 256, or 4 x 128 for a CPU; auto takes the paper's on CUDA."""
     ndc: Ndc = "auto"
-    """--field nerf in normalised device coordinates: auto where an LLFF or COLMAP capture looks one way."""
+    """--field nerf in normalized device coordinates: auto where an LLFF or COLMAP capture looks one way."""
     training: Training = dataclasses.field(default_factory=TrainingOptions)
     device: Device = "auto"
     resume: Flag = False

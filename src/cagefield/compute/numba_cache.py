@@ -19,7 +19,7 @@ from cagefield.compute.kernel_cache import cache_folder, warn_cache_unusable
 from cagefield.files.user_cache import source_digest
 
 FAST: dict[str, Any] = {"fastmath": True, "error_model": "numpy", "cache": True}
-"""Options of every kernel: without `error_model`, checks for division by zero keep loops from vectorising."""
+"""Options of every kernel: without `error_model`, checks for division by zero keep loops from vectorizing."""
 
 _TOLD: list[Exception] = []
 

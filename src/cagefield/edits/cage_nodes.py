@@ -94,7 +94,7 @@ def _control_points(node: Node) -> ControlPoints:
 
 
 def parse_cage(node: Node) -> Cage:
-    """The cage with 8 corners of a mapping with its centre and size, or its corners."""
+    """The cage with 8 corners of a mapping with its center and size, or its corners."""
     keys = node.mapping(optional=("center", "size", "rotation_deg", "corners", "pivot"))
     if "corners" in keys:
         for other in ("center", "size", "rotation_deg"):
@@ -108,7 +108,7 @@ def parse_cage(node: Node) -> Cage:
     else:
         missing = "size" if "center" in keys else "center"
         raise node.error(f'a cage needs center and size, or 8 corners; "{missing}" is missing')
-    # The pivot of a box is the centre as written; the mean of its corners can differ in the last bit.
+    # The pivot of a box is the center as written; the mean of its corners can differ in the last bit.
     place = keys.get("pivot", keys.get("center"))
     pivot = None if place is None else place.vector()
     try:
@@ -166,7 +166,7 @@ def _from_control_points(cage: ControlPoints) -> dict[str, Any]:
 
 
 def dump_cage(cage: Cage) -> dict[str, Any]:
-    """A cage as centre, size and rotation where that gives back its very corners, else as corners."""
+    """A cage as center, size and rotation where that gives back its very corners, else as corners."""
     R, _ = np.linalg.qr(cage.affine[0])
     R = R * np.sign(np.diag(R.T @ cage.affine[0]))
     rotation = euler_degrees(Rotation.from_matrix(R))

@@ -86,7 +86,7 @@ class Cage:
 
     @classmethod
     def box(cls, center: ArrayLike, size: ArrayLike, rotation: ArrayLike = (0.0, 0.0, 0.0)) -> Cage:
-        """A box: centre [3], full edge lengths [3] (or one for a cube), intrinsic XYZ rotation in radians."""
+        """A box: center [3], full edge lengths [3] (or one for a cube), intrinsic XYZ rotation in radians."""
         c = vector(center, "cage center")
         s = factors(size, "cage size")
         offsets = (hexahedron.BITS - 0.5) * s

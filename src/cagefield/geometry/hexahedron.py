@@ -6,7 +6,7 @@ x(u) = sum_k N_k(u) v_k with N_k the trilinear weights. Internally xi = 2u - 1 a
     x(xi) = C_0 + C_1 xi + C_2 eta + C_4 zeta + C_3 xi eta + C_5 xi zeta + C_6 eta zeta + C_7 xi eta zeta
 
 whose index has the bits of its variables. The inverse works on y = W (x - C_0) with W the inverse of the
-Jacobian at the centre, so that y = xi + (four terms that vanish on parallelepipeds): thin and sheared
+Jacobian at the center, so that y = xi + (four terms that vanish on parallelepipeds): thin and sheared
 hexahedra are as well conditioned as cubes. `hex_determinant` tests the Jacobian's sign.
 """
 
@@ -101,7 +101,7 @@ def inverse(corners: Array, targets: Array) -> tuple[Array, Mask]:
 
 
 def center_inverse(C: Array) -> Array:
-    """W [3,3], the inverse of dx/dxi at the centre of the hexahedron with monomial coefficients C [8,3].
+    """W [3,3], the inverse of dx/dxi at the center of the hexahedron with monomial coefficients C [8,3].
 
     A singular one, as only folded hexahedra have, is moved off zero by 1e-9 of its size.
     """

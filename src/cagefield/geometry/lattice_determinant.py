@@ -82,7 +82,7 @@ def _cells(net: Array, shape: tuple[int, int, int]) -> Array:
 def _strain(windows: Array, shape: tuple[int, int, int], interpolation: str) -> Array:
     """A bound [B] of |dx/du - 1| in each cell; below 1 the determinant is positive.
 
-    The columns of dx/du are means of the differences between neighbouring control points.
+    The columns of dx/du are means of the differences between neighboring control points.
     """
     if interpolation == "linear":
         windows = windows[:, 1:3, 1:3, 1:3]

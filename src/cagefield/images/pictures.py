@@ -18,7 +18,7 @@ Pictures = dict[str, AnyArray]
 
 @dataclass(frozen=True)
 class DepthScale:
-    """Grey levels for distances: white at `near`, black at `far`, linear in the inverse distance."""
+    """Gray levels for distances: white at `near`, black at `far`, linear in the inverse distance."""
 
     near: float
     far: float
@@ -34,10 +34,10 @@ class DepthScale:
         return cls(near, max(float(far), 1.01 * near))
 
     def picture(self, depth: AnyArray) -> AnyArray:
-        """Grey picture [H,W,3] in [0,1]; black where nothing is seen."""
+        """Gray picture [H,W,3] in [0,1]; black where nothing is seen."""
         inverse = 1.0 / np.maximum(depth, 1e-6)
-        grey = (inverse - 1.0 / self.far) / (1.0 / self.near - 1.0 / self.far)
-        return np.repeat(np.clip(grey, 0.0, 1.0)[..., None], 3, axis=-1)
+        gray = (inverse - 1.0 / self.far) / (1.0 / self.near - 1.0 / self.far)
+        return np.repeat(np.clip(gray, 0.0, 1.0)[..., None], 3, axis=-1)
 
 
 def pictures_of(frames: Sequence[RenderResult], depth_scale: DepthScale | None = None) -> Pictures:

@@ -1,4 +1,4 @@
-"""A VoxelField as the page's GPU draws it: 8 bits a colour coefficient, half floats of density, deflated.
+"""A VoxelField as the page's GPU draws it: 8 bits a color coefficient, half floats of density, deflated.
 
 A file holds levels, each the whole field: a coarse one without view dependence, which is there soon, and the
 full one. Of a level there are, with n vertices an axis and bricks of B^3 *vertices* (brick b holds the
@@ -13,7 +13,7 @@ vertices B b ... B b + B - 1):
                vertex to the next; the first from 128
 
 Vertices come brick by brick, z fastest inside. One without density in any of the 8 cells around it is left
-out: no picture shows it. One that is not stored has density 0 and q = 128, which is exactly grey.
+out: no picture shows it. One that is not stored has density 0 and q = 128, which is exactly gray.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ COARSE = 64
 """Vertices along the longest axis of the coarse level: 0.1 to 0.5 MB."""
 
 FINEST = 0.03
-"""Smallest step of a colour coefficient. Of a digger of a million vertices, degree 2:
+"""Smallest step of a color coefficient. Of a digger of a million vertices, degree 2:
 
     step                 range / 127    0.025    0.04    0.06
     bytes a vertex       15.0           11.1     9.0     7.2
@@ -121,7 +121,7 @@ def coarse_field(field: VoxelField, longest: int) -> VoxelField:
     """The field on a grid of `longest` vertices along its longest axis, SH degree 0.
 
     Each vertex has the mean density of the vertices around it, so that optical depth is kept, and their
-    colour, weighted with density.
+    color, weighted with density.
     """
     old = np.array(field.resolution)
     new = np.maximum(np.round((old - 1) * ((longest - 1) / (old.max() - 1))).astype(int) + 1, 2)
@@ -154,8 +154,8 @@ def _encode_level(field: VoxelField) -> Level:
     parts = encode_vertices(
         field.vertices[shown],
         field.resolution,
-        quantised_density(field.density[shown], field),
-        quantised_colours(field.sh[shown], field),
+        quantized_density(field.density[shown], field),
+        quantized_colors(field.sh[shown], field),
     )
     codes = of_field(field).codes.astype(np.uint16)
     header = {
@@ -181,17 +181,17 @@ def unit_of(field: VoxelField) -> float:
 
 @memoized_weakly
 def steps_of(field: VoxelField) -> Float32:
-    """Steps [K] of a field's colour coefficients, of which 127 reach the largest that a picture shows."""
+    """Steps [K] of a field's color coefficients, of which 127 reach the largest that a picture shows."""
     largest = np.abs(field.sh[_shown(field)]).max(axis=(0, 2), initial=0.0)
     return np.maximum(largest / 127.0, FINEST).astype(np.float32)
 
 
-def quantised_density(density: Float32, field: VoxelField) -> NDArray[np.float16]:
+def quantized_density(density: Float32, field: VoxelField) -> NDArray[np.float16]:
     """Densities [M] as the file of a field has them."""
     return np.clip(density / unit_of(field), -HALF_MAX, HALF_MAX).astype(np.float16)
 
 
-def quantised_colours(sh: Float32, field: VoxelField) -> NDArray[np.uint8]:
+def quantized_colors(sh: Float32, field: VoxelField) -> NDArray[np.uint8]:
     """Coefficients [M,K,3] as the file of a field has them; those beyond its 127 steps are cut off."""
     whole = 128 + np.round(sh / steps_of(field)[:, None])
     return np.clip(whole, 0, 255).astype(np.uint8)
@@ -205,7 +205,7 @@ def encode_vertices(
 ) -> dict[str, NDArray[Any]]:
     """The arrays `bricks`, `masks`, `density` and `sh` of vertices of a grid.
 
-    vertices [M]: linear indices, rising; density [M] and sh [M,K,3] quantised.
+    vertices [M]: linear indices, rising; density [M] and sh [M,K,3] quantized.
     """
     flat = np.zeros(int(np.prod(resolution)), bool)
     flat[vertices] = True

@@ -7,7 +7,7 @@ Of a layer NAME there are, in a box of bricks that holds all vertices where it i
     NAME.cells   [bricks of the box] uint8, of the bricks of *cells*: 0 as the field's, 1 other, 2 empty
     NAME.bricks, NAME.masks, NAME.density, NAME.sh   as in `page_field`, of these vertices in the box
 
-Density and colours have the field's own units and steps, so that one texture holds both; colours beyond 127
+Density and colors have the field's own units and steps, so that one texture holds both; colors beyond 127
 of these steps are cut off.
 """
 
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from cagefield.compute.weak_memo import memoized_weakly
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.fields.voxel_layers import layer_slices
-from cagefield.pages.page_field import BRICK, encode_vertices, quantised_colours, quantised_density
+from cagefield.pages.page_field import BRICK, encode_vertices, quantized_colors, quantized_density
 from cagefield.typing import Float32
 
 AS_FIELD, OTHER, EMPTY = 0, 1, 2
@@ -66,9 +66,9 @@ def digest(*arrays: NDArray[Any]) -> str:
 def _other(
     layer: VoxelField, field: VoxelField
 ) -> tuple[NDArray[np.int64], NDArray[np.float16], NDArray[np.uint8]]:
-    """(vertices [M], density [M], sh [M,K,3]), quantised, where a layer's block is other than the field.
+    """(vertices [M], density [M], sh [M,K,3]), quantized, where a layer's block is other than the field.
 
-    A vertex that the layer does not have is empty: density 0, grey.
+    A vertex that the layer does not have is empty: density 0, gray.
     """
     # Two sorted runs, which a stable sort merges.
     vertices = np.sort(np.concatenate([layer.vertices, _in_block(layer, field)]), kind="stable")
@@ -76,8 +76,8 @@ def _other(
     one, other = (_values(source, vertices) for source in (layer, field))
     apart = (one[0] != other[0]) | (one[1] != other[1]).any(axis=(1, 2))
     vertices = vertices[apart]
-    density, old_density = (quantised_density(source[0][apart], field) for source in (one, other))
-    sh, old_sh = (quantised_colours(source[1][apart], field) for source in (one, other))
+    density, old_density = (quantized_density(source[0][apart], field) for source in (one, other))
+    sh, old_sh = (quantized_colors(source[1][apart], field) for source in (one, other))
     seen = (density != old_density) | (sh != old_sh).any(axis=(1, 2))
     return vertices[seen], density[seen], sh[seen]
 

@@ -4,13 +4,13 @@ The page keeps the splats that it has loaded (`page_splats`) and lays these over
 field, in the page's order, and M that come (moved ones, copies, the children of split ones):
 
     hidden       [ceil(N / 8)] uint8, bit n mod 8 of byte n / 8 is set where splat n is not shown as it is
-    sources      [M] int32, the splat whose colours splat m has
-    means        [M, 3] float32, in deformed space, less the field's centre
+    sources      [M] int32, the splat whose colors splat m has
+    means        [M, 3] float32, in deformed space, less the field's center
     covariances  [M, 6] float32: xx, xy, xz, yy, yz, zz
     opacities    [2, M] uint8, high bytes first, of 65535 o
     gains        [M] int32: factors of the red, green and blue of a source's color, see
                  `encode_gains`; or, where an edit grades colors, [4, M], matrices: see `encode_colors`
-    turns        [2, 3, M] uint8, see `page_splats.encode_orthogonals`: R; colours are those of the source
+    turns        [2, 3, M] uint8, see `page_splats.encode_orthogonals`: R; colors are those of the source
                  seen along R^T d
 
 Where the header says `packed`, sources rise, and in the place of means and covariances there are `chunks`,
@@ -55,7 +55,7 @@ MAGIC, VERSION = b"cagesped", 2
 
 @dataclass(frozen=True)
 class PageSplatEdits:
-    """Decoded file: hidden [N], sources [M], means [M,3] less the centre, covariances [M,6], opacities
+    """Decoded file: hidden [N], sources [M], means [M,3] less the center, covariances [M,6], opacities
     [M], turns [M,4] (w, x, y, z), gains [M,3]; colors [M,3,3] in place of gains where an edit grades them;
     mirrored [M], True where the orthogonal matrix is minus that of the turn."""
 

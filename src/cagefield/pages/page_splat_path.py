@@ -3,7 +3,7 @@
     times        [S] float32, seconds from the path's begin, rising
     states       [S] uint16, the state at each of these times; a state that comes again is stored once
     hidden.k     [ceil(N / 8)] uint8, as in `page_splat_edits`
-    sources.k    [M] int32, rising: the splats whose colours the state's splats have
+    sources.k    [M] int32, rising: the splats whose colors the state's splats have
     rotations.k, scales.k   as in `page_splats`: canonical shapes, before the edits
     opacities.k  [2, M] uint8, as there
     gains.k      [M] int32, or [4, M], as in `page_splat_edits`
@@ -13,7 +13,7 @@
 Entry n of the header's `hidden`, `sources`, `rotations`, `scales`, `opacities` and `gains` says which of them
 state n has.
 
-Of the rows of moves, means are low + step q, in deformed space less the field's centre, with the header's
+Of the rows of moves, means are low + step q, in deformed space less the field's center, with the header's
 `low` and `step`, which all states share. Turns are as in `page_splats.encode_orthogonals`. Stretches are
 1 + STRETCH (q - 32768) on the diagonal, STRETCH (q - 32768) beside it: xx, xy, xz, yy, yz, zz. With a turn R,
 a stretch S and the canonical covariance C, J = R S is the map's Jacobian and R S C S R^T the splat's
@@ -71,7 +71,7 @@ STRETCH = 1.0 / 256.0
 class SplatPathState:
     """Difference that edits make at one moment: hidden [ceil(N/8)] and sources [M] as in the file.
 
-    Of each splat: means [M,3], less the field's centre; turns and stretches [M,3,3], R and
+    Of each splat: means [M,3], less the field's center; turns and stretches [M,3,3], R and
     S of the map's Jacobian R S; its own shape, quaternions [M,4] and log_scales [M,3]; opacities [M]; encoded
     gains [M] or [4,M].
     """

@@ -1,22 +1,22 @@
-"""A SplatField as the page's GPU draws it: quantised records, deflated, in levels from coarse to fine.
+"""A SplatField as the page's GPU draws it: quantized records, deflated, in levels from coarse to fine.
 
 Why a renderer of our own (`web/src/splats`) and not Spark 2.2, which draws splats in three.js: its pictures
-are 27 to 50 dB from our rasteriser's, and 40 to 66 dB with every option set like ours
-(`benchmarks/results/splat_spark.md`), where ours are 50 to 66; it evaluates colour before a splat is moved,
-so that edits would show the colours of other directions; it gives no depth, which the editor's lines, cages
+are 27 to 50 dB from our rasterizer's, and 40 to 66 dB with every option set like ours
+(`benchmarks/results/splat_spark.md`), where ours are 50 to 66; it evaluates color before a splat is moved,
+so that edits would show the colors of other directions; it gives no depth, which the editor's lines, cages
 and moving pictures need; and its module is 2.7 MB, where ours is 30 kB.
 
 A level is some of the splats, drawn with those before it: splats of the largest area come first, so that the
 start of
-a file is a coarse image. In a level, splats lie in an order in which neighbours in space are neighbours
+a file is a coarse image. In a level, splats lie in an order in which neighbors in space are neighbors
 (`page_order`), in chunks of CHUNK. With M splats, C chunks and K coefficients a channel, a level has
 
-    chunks     [C, 2, 3] float32, least and largest of the means of a chunk, less the header's `centre`
+    chunks     [C, 2, 3] float32, least and largest of the means of a chunk, less the header's `center`
     means      [B, 3, M] uint8, bytes, high ones first, of q: mean = least + (largest - least) q / (256^B - 1)
     rotations  [2, 3, M] uint8, see `encode_rotations`
     scales     [2, 3, M] uint8, of 65535 (log s - low) / (high - low), with the header's `log_scales`
     opacities  [2, M] uint8, of 65535 o
-    colours    [2, 3, M] uint8, of 32768 + k0 / step, with the header's `colour_step`
+    colors    [2, 3, M] uint8, of 32768 + k0 / step, with the header's `color_step`
     sh         [K - 1, 3, M] uint8, 128 + k / steps[k - 1], with the header's `steps`, from degree 1 on
 
 Where there are two bytes of a number, the high ones come first.
@@ -53,7 +53,7 @@ OFF = 1e-4
 nearer: a tenth of a pixel of a picture of 800 that shows the box. Two bytes are enough but for fields with
 splats far apart."""
 
-ROTATION_BITS, SCALE_BITS, OPACITY_BITS, COLOUR_STEP = 12, 12, 10, 1.0 / 256.0
+ROTATION_BITS, SCALE_BITS, OPACITY_BITS, COLOR_STEP = 12, 12, 10, 1.0 / 256.0
 SH_STEP = 0.01
 """How finely a splat is told; SH_STEP is the smallest step of the coefficients from degree 1 on.
 
@@ -102,14 +102,14 @@ def encode_page_splats(
     if field.discs:
         raise FieldError("the server draws this scene: its splats are discs (2DGS), which pages do not draw")
     order, ends = _layout(field)
-    centre = field.center
+    center = field.center
     shown = np.where(splats.is_pasted, np.float32(0.0), field.opacities)
     steps = coefficient_steps(field)
     arrays = {}
     for number, (first, end) in enumerate(zip((0, *ends), ends, strict=False)):
-        parts = encode_level(field, order[first:end], shown, centre, steps, field)
+        parts = encode_level(field, order[first:end], shown, center, steps, field)
         arrays.update({f"{number}.{name}": part for name, part in parts.items()})
-    return pack(MAGIC, VERSION, splat_header(field, centre, steps, background, list(ends)), arrays)
+    return pack(MAGIC, VERSION, splat_header(field, center, steps, background, list(ends)), arrays)
 
 
 def coefficient_steps(field: SplatField) -> NDArray[np.float64]:
@@ -131,7 +131,7 @@ def encode_level(
         "chunks": chunks,
         "means": means,
         **encode_shapes(field.quaternions[rows], field.log_scales[rows], opacities[rows]),
-        "colours": byte_pairs(np.clip(32768 + np.round(field.sh[rows, 0] / COLOUR_STEP), 0, 65535).T),
+        "colors": byte_pairs(np.clip(32768 + np.round(field.sh[rows, 0] / COLOR_STEP), 0, 65535).T),
         "sh": np.clip(128 + np.round(field.sh[rows, 1:] / steps[:, None]), 0, 255)
         .astype(np.uint8)
         .transpose(1, 2, 0),
@@ -151,11 +151,11 @@ def splat_header(
         "degree": field.sh_degree,
         "antialiased": field.antialiased,
         "bounds": field.bounds.tolist(),
-        "centre": center.tolist(),
+        "center": center.tolist(),
         "near": near_depth(field.bounds),
         "background": None if background is None else list(background),
         "log_scales": list(SCALES),
-        "colour_step": COLOUR_STEP,
+        "color_step": COLOR_STEP,
         "steps": [float(step) for step in steps],
         "levels": levels,
     }
@@ -194,12 +194,12 @@ def decode_page_splats(data: bytes) -> PageSplats:
         raise FieldError("garbled splats for pages; write them again") from error
 
 
-_PARTS = ("chunks", "means", "rotations", "scales", "opacities", "colours", "sh")
+_PARTS = ("chunks", "means", "rotations", "scales", "opacities", "colors", "sh")
 
 
-def encode_means(means: AnyArray, centre: AnyArray, field: SplatField) -> tuple[Float32, NDArray[np.uint8]]:
+def encode_means(means: AnyArray, center: AnyArray, field: SplatField) -> tuple[Float32, NDArray[np.uint8]]:
     """(chunks [C,2,3], bytes [B,3,M]) of means [M,3]; as many bytes as OFF asks for."""
-    local = means.astype(np.float64) - centre
+    local = means.astype(np.float64) - center
     starts = np.arange(0, len(local), CHUNK)
     # Rounded outwards, so that no mean lies outside.
     low = np.nextafter(np.minimum.reduceat(local, starts).astype(np.float32), np.float32(-np.inf))
@@ -214,14 +214,14 @@ def encode_means(means: AnyArray, centre: AnyArray, field: SplatField) -> tuple[
     return np.stack([low, high], axis=1), planes
 
 
-def decode_means(chunks: Float32, planes: NDArray[np.uint8], centre: AnyArray) -> Float32:
+def decode_means(chunks: Float32, planes: NDArray[np.uint8], center: AnyArray) -> Float32:
     """Means [M,3] from values of `encode_means`."""
     whole = np.zeros(planes.shape[1:], np.float64)
     for plane in planes:
         whole = 256.0 * whole + plane
     own = np.arange(planes.shape[2]) // CHUNK
     low, high = chunks[own, 0].astype(np.float64), chunks[own, 1].astype(np.float64)
-    return np.asarray(low + (high - low) * whole.T / (256.0 ** len(planes) - 1.0) + centre, np.float32)
+    return np.asarray(low + (high - low) * whole.T / (256.0 ** len(planes) - 1.0) + center, np.float32)
 
 
 def encode_shapes(
@@ -295,14 +295,14 @@ def _decode_level(header: dict[str, Any], parts: dict[str, NDArray[Any]], count:
         "rotations": (2, 3, count),
         "scales": (2, 3, count),
         "opacities": (2, count),
-        "colours": (2, 3, count),
+        "colors": (2, 3, count),
         "sh": ((int(header["degree"]) + 1) ** 2 - 1, 3, count),
     }
     if any(parts[name].shape != shape for name, shape in shapes.items()):
         raise FieldError("arrays of splats for pages do not fit each other; write them again")
-    means = decode_means(parts["chunks"], parts["means"], np.asarray(header["centre"], np.float64))
+    means = decode_means(parts["chunks"], parts["means"], np.asarray(header["center"], np.float64))
     log_scales, quaternions, opacities = decode_shapes(parts)
-    first = (from_byte_pairs(parts["colours"]).T - 32768.0) * float(header["colour_step"])
+    first = (from_byte_pairs(parts["colors"]).T - 32768.0) * float(header["color_step"])
     steps = np.asarray(header["steps"], np.float64)
     rest = (parts["sh"].transpose(2, 0, 1).astype(np.float64) - 128.0) * steps[:, None]
     sh = np.concatenate([first[:, None], rest], axis=1).astype(np.float32)

@@ -115,7 +115,7 @@ class ScenePage:
         header: dict[str, Any] = {
             "start": _view(scene.first_camera),
             "up": scene.up.tolist(),
-            "centre": scene.field.center.tolist(),
+            "center": scene.field.center.tolist(),
             "background": None if scene.background is None else list(scene.background),
             "path": _path(keys, loop),
             "extent": 2.0 * float(np.linalg.norm(scene.field.half_size)),

@@ -1,4 +1,4 @@
-"""Sphere tracing of procedural scenes in vectorised numpy.
+"""Sphere tracing of procedural scenes in vectorized numpy.
 
 Every primitive is traced on its own, on the rays that meet its bounds, in its own frame: there a world ray
 o + t d becomes o' + t d' with the same t, and shape.distance(p) / |d'| is a safe step in t for any pose.

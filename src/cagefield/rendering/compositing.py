@@ -42,7 +42,7 @@ def weights(sigma: AnyArray, delta: AnyArray) -> AnyArray:
 
 
 def composite(sigma: AnyArray, rgb: AnyArray, t: AnyArray, delta: AnyArray) -> Composite:
-    """Premultiplied colour, opacity, expected depth and weights of rays.
+    """Premultiplied color, opacity, expected depth and weights of rays.
 
     sigma, t, delta [...,S]; rgb [...,S,3]. Depth is sum(w t) / sum(w). Exact when sigma and rgb are constant
     on each segment (depth: to the midpoint of a segment).

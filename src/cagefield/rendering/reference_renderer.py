@@ -55,8 +55,8 @@ def render_sampled(
     """Frame of a field seen by a camera, from `samples` midpoints on each ray's piece inside the bounds.
 
     The piece is the ray's intersection with field.bounds (united with edits.bounds), cut to [near, far].
-    A field without `bounds` needs `far`. Normals are minus the normalised gradient of sigma by central
-    differences in deformed space, weighted like the colour. `preserve_opacity` multiplies sigma by |J d|,
+    A field without `bounds` needs `far`. Normals are minus the normalized gradient of sigma by central
+    differences in deformed space, weighted like the color. `preserve_opacity` multiplies sigma by |J d|,
     which keeps optical depth under the edits' stretch; without it (the paper) a surface that is pressed
     together lets light through. `chunk` is the number of samples held at a time.
     The error falls with the square of the step for smooth fields, with the step where sigma jumps.

@@ -2,7 +2,7 @@
 
 World units are those of the training: the data set's own for Blender scenes. For a forward-facing LLFF
 capture nerf-pytorch scales the poses until the nearest bound is 4/3 and puts the mean camera at the origin,
-looking along -z; so are the cameras here. nerf-pytorch puts pixel centres at whole numbers; the cameras are
+looking along -z; so are the cameras here. nerf-pytorch puts pixel centers at whole numbers; the cameras are
 shifted by half a pixel so that their rays are the ones that the networks know.
 """
 
@@ -83,7 +83,7 @@ def import_nerf(
 
 
 def shifted(camera: Camera) -> Camera:
-    """The camera with the rays that nerf-pytorch casts for its pixels: centres at whole numbers."""
+    """The camera with the rays that nerf-pytorch casts for its pixels: centers at whole numbers."""
     return dataclasses.replace(camera, cx=camera.cx + 0.5, cy=camera.cy + 0.5)
 
 

@@ -103,7 +103,7 @@ FRONT_FOV_X = math.radians(45.0)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Scene:
-    """A field with its edit stack, cameras by split ("train", "test", "val") and background colour.
+    """A field with its edit stack, cameras by split ("train", "test", "val") and background color.
 
     Background None means nothing behind the scene. The field stays as it was trained; the edits are applied
     when it is rendered. `gains` are the exposures of the training photos as they were fitted: photo = gain x
@@ -400,10 +400,10 @@ class Scene:
                 f"camera must be a Camera, got {camera!r:.60}; give one such as scene.cameras['test'][0]"
             )
         own = isinstance(background, str) and background == "scene"
-        colour = self.background if own else background_rgb(background)
+        color = self.background if own else background_rgb(background)
         if not exact:
-            return self.renderer.render(camera, background=colour, normals=normals)
-        return self._exact_renderer(camera).render(camera, background=colour, normals=normals)
+            return self.renderer.render(camera, background=color, normals=normals)
+        return self._exact_renderer(camera).render(camera, background=color, normals=normals)
 
     def _exact_renderer(self, camera: Camera) -> Renderer:
         """The renderer that evaluates every edit in float64, without a lattice; see `render`."""

@@ -2,7 +2,7 @@
 
 Notation: V^c canonical inner cage, V deformed inner cage, V^o outer cage, phi the inner map V -> V^c,
 phi' the shell map V^o \\ V -> V^o \\ V^c; p a point, J the Jacobian of the map at p. Everything here is the
-float64 reference, vectorised over points [N,3]; `kernels.trilinear_hex`, `kernels.lattice` and
+float64 reference, vectorized over points [N,3]; `kernels.trilinear_hex`, `kernels.lattice` and
 `kernels.flow_shell` have the same maps for one sample in a kernel, `kernels.edit_maps` puts them together,
 and `device_stack` packs a stack of edits for it.
 

@@ -4,7 +4,7 @@ Notation: t in [0,1] is the time. The cage at time t, and all of space with it (
 
     x(xi, t) = c(t) + F(t) y_t(xi),    y_t(xi) = xi + B_t(xi) in the cage.
 
-With F_0, F_1 the Jacobians at the centres of the canonical and the deformed cage, and F_1 F_0^-1 = R S its
+With F_0, F_1 the Jacobians at the centers of the canonical and the deformed cage, and F_1 F_0^-1 = R S its
 polar decomposition, F(t) = e^(-k sin(pi t)) R^t S^t F_0: the rotation turns evenly about a fixed axis (by 180
 degrees at most), the stretch is log-linear, the bend K goes linearly from the one cage's to the other's,
 and k >= 0 shrinks the cage on its way by just as much as keeps it inside the outer cage. c(t) is a straight
@@ -135,7 +135,7 @@ class Motion:
 
     @cached_property
     def _straight(self) -> bool:
-        """False where the straight way of the cage's centre comes too near to the outer cage."""
+        """False where the straight way of the cage's center comes too near to the outer cage."""
         if self.confines.is_affine:
             return True
         a, b = self.start.center, self.end.center

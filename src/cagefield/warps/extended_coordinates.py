@@ -17,8 +17,8 @@ from cagefield.warps.trilinear_bend import AXIS_COEFFICIENTS, SIGNS, bends, bend
 class Extended:
     """Space in a cage's coordinates: x = c + F y(xi).
 
-    Parameters: centre c [3], frame F [3,3], bend K [4,3]; the tilts, F^-1 and the distances of the faces from
-    the centre along their normals follow from them.
+    Parameters: center c [3], frame F [3,3], bend K [4,3]; the tilts, F^-1 and the distances of the faces from
+    the center along their normals follow from them.
     """
 
     center: Array
@@ -40,7 +40,7 @@ class Extended:
 
     @cached_property
     def heights(self) -> Array:
-        """Distance [3] of each pair of faces of the affine part from the centre."""
+        """Distance [3] of each pair of faces of the affine part from the center."""
         return np.asarray(1.0 / np.linalg.norm(self.inverse, axis=1))
 
     @cached_property
@@ -180,4 +180,4 @@ def slope_columns(form: Array, xi: Array) -> tuple[Array, Array, Array]:
 
 
 _STARTS = np.concatenate([np.zeros((1, 3)), SIGNS, 2.0 * SIGNS])
-"""Where Newton's method starts again: the centre, the corners, and a cube twice as large."""
+"""Where Newton's method starts again: the center, the corners, and a cube twice as large."""

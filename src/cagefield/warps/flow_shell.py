@@ -40,7 +40,7 @@ class FlowShell:
     V is the velocity of the inner cage's motion (see `cage_motion`), with which all of space would go along:
     an affine map of x for a parallelepiped. w is 1 in the cage and 0 outside the outer cage, so a point on
     the one's faces goes with it, and on the other's stays. With xi the coordinates of the inner cage at t, z
-    those of the outer cage, h and H the distances of their pairs of faces from their centres,
+    those of the outer cage, h and H the distances of their pairs of faces from their centers,
 
         d_i = |e|_p,  e_a = h_a max(|xi_a| - 1, 0);    1 / d_o = |1 / D|_p,  D_a = H_a (1 - z_a^2) / 2,
 

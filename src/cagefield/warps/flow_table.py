@@ -60,7 +60,7 @@ def table_along(shell: FlowShell, knots: Array) -> Array:
     rows = np.zeros((2 * steps + 1, MOMENT, 3))
     rows[:, 0:3] = W @ outer.frame
     rows[:, 3] = (W @ (outer.center - c)[:, :, None])[:, :, 0]
-    L = outer.inverse @ dF @ W  # velocity in Z per offset of p from the cage's centre
+    L = outer.inverse @ dF @ W  # velocity in Z per offset of p from the cage's center
     rows[:, 4:7] = L @ outer.frame
     rows[:, 7] = (L @ (outer.center - c)[:, :, None])[:, :, 0] + dc @ outer.inverse.T
     rows[:, 8] = 1.0 / np.linalg.norm(W, axis=2) / unit

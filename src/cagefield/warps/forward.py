@@ -1,6 +1,6 @@
 """A warp's map to deformed space at many points, soon: for splats, which are taken there and not sampled.
 
-Everything but flows is the float64 reference, which is vectorised. A flow goes forwards
+Everything but flows is the float64 reference, which is vectorized. A flow goes forwards
 through its steps by a kernel, where the reference inverts the way back: they differ by the error of the
 integration, which falls with the fourth power of the step, and by the rounding of float32, half of the time
 of float64. On boxes of half-size .3 in .8, turned by 140 degrees and scaled by 1.2, that is 4e-7 of the scene

@@ -27,7 +27,7 @@ class TrilinearShell:
 
     The hexahedron of a side joins the inner cage's face to the outer cage's face of the same side. phi' is
     inverse-trilinear in the deformed one (deformed inner corners), then trilinear in the canonical one; the
-    outer corners are shared. Neighbours share a bilinear face and the map on it, so phi' is continuous; it
+    outer corners are shared. Neighbors share a bilinear face and the map on it, so phi' is continuous; it
     equals phi on the inner cage's faces and the identity on the outer cage's. Sides are those of the inner
     cage; the outer cage's corners are renumbered by the one of the 24 turns that fits them best.
 

@@ -112,7 +112,7 @@ export const INITIAL: Editor = {
   axes: "world",
   cage: "inner",
   snap: false,
-  view: "colour",
+  view: "color",
   before: false,
   split: null,
   grid: false,

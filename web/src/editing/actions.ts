@@ -27,7 +27,7 @@ import {
   type View,
 } from "../app/store";
 
-const VIEWS: View[] = ["colour", "depth", "opacity", "normals"];
+const VIEWS: View[] = ["color", "depth", "opacity", "normals"];
 const O_KEY_NOTICE = "cagefield.proportional";
 const CAGES: CageName[] = ["inner", "outer", "both"];
 

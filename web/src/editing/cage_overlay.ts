@@ -69,7 +69,7 @@ export function cageOverlay(
   for (const edit of editor.state.edits) {
     if (edit === chosen || !edit.enabled) continue;
     const cages = shownCages(edit, drag);
-    const tint = color(edit.colour);
+    const tint = color(edit.color);
     addCage(out, cages.deformed, tint, OTHER);
     if (hasOwnPoints(edit)) addPoints(out, cages.deformed, tint);
     if (cages.outer && edit.kind === "continuous" && !edit.outer_follows)
@@ -78,7 +78,7 @@ export function cageOverlay(
   if (chosen === null) return out;
   const cages = shownCages(chosen, drag);
   addSelectedEdit(out, editor, chosen, cages, grid, eye);
-  if (chosen.cage === "points") addReach(out, editor, cages, color(chosen.colour), forward);
+  if (chosen.cage === "points") addReach(out, editor, cages, color(chosen.color), forward);
   if (drag?.operation?.kind === "move_points" && (drag.operation.radius ?? 0) > 0) {
     const center = middleOf(targetCage(cages, drag.target), drag.operation.points);
     addPolyline(out, circle(center, drag.operation.radius!, forward), WHITE, REACH);
@@ -99,7 +99,7 @@ function addSelectedEdit(
   grid: Vec3[][],
   eye: Vec3,
 ): void {
-  const tint = color(edit.colour);
+  const tint = color(edit.color);
   const setting = editor.mode === "set";
   const dim = edit.enabled ? 1 : 0.4;
   if (editor.grid) for (const line of grid) addPolyline(out, line, tint, GRID);

@@ -172,7 +172,7 @@ export function bindings(
       action: "Focus on the cage, or on the surface under the mouse",
       run: () => actions.focus(pointer.position.x, pointer.position.y),
     },
-    { group: "View", keys: ["V"], action: "Colour, depth, opacity, normals", run: () => actions.nextView() },
+    { group: "View", keys: ["V"], action: "Color, depth, opacity, normals", run: () => actions.nextView() },
     { group: "View", keys: ["L"], action: "Deformed lattice", run: () => actions.toggle("grid") },
     {
       group: "View",

@@ -198,7 +198,7 @@ export class FieldRenderer implements SceneDrawer<PageEdits> {
     width: number,
     height: number,
     framebuffer: WebGLFramebuffer | null = null,
-    view: View = "colour",
+    view: View = "color",
   ): void {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);

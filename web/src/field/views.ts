@@ -9,7 +9,7 @@ import type { RenderTargets } from "./targets";
 
 type GL = WebGL2RenderingContext;
 
-export const VIEWS = ["colour", "depth", "opacity", "normals"] as const;
+export const VIEWS = ["color", "depth", "opacity", "normals"] as const;
 export type View = (typeof VIEWS)[number];
 
 /** Subsampled distances of an image, top row first; infinite at an opacity up to .5. */

@@ -273,7 +273,7 @@ export interface Command {
  */
 export interface DisplayMessage {
   type: "display";
-  view?: "colour" | "depth" | "opacity" | "normals";
+  view?: "color" | "depth" | "opacity" | "normals";
   before?: boolean;
   split?: number | null;
 }
@@ -699,7 +699,7 @@ export interface Dragged {
 export interface EditState {
   id: number;
   name: string;
-  colour: string;
+  color: string;
   enabled: boolean;
   locked: boolean;
   kind: "continuous" | "move" | "copy" | "delete";
@@ -855,7 +855,7 @@ export interface PictureHeader {
   drag: number;
   seq: number;
   revision: number;
-  view: "colour" | "depth" | "opacity" | "normals";
+  view: "color" | "depth" | "opacity" | "normals";
   before: boolean;
   split: number | null;
   x: number;

@@ -5,7 +5,7 @@ import type { Depths } from "./depth_order";
 import type { SplatHeader } from "./splat_file";
 
 /** The camera's position relative to the center of the splats. */
-export function relativeEye({ centre: center }: SplatHeader, { c2w }: PinholeCamera): Vec3 {
+export function relativeEye({ center: center }: SplatHeader, { c2w }: PinholeCamera): Vec3 {
   return [c2w[3] - center[0], c2w[7] - center[1], c2w[11] - center[2]];
 }
 

@@ -29,13 +29,13 @@ export interface SplatHeader {
   antialiased: boolean;
   bounds: [Vec3, Vec3];
   /** The point to which means are relative. */
-  centre: Vec3;
+  center: Vec3;
   /** The smallest depth at which splats are drawn. */
   near: number;
   background: Vec3 | null;
   /** Logarithms of scales for the codes 0 and 65535. */
   log_scales: [number, number];
-  colour_step: number;
+  color_step: number;
   /** Color coefficient of one step of the 8-bit values, from degree 1 on. */
   steps: number[];
   /** Number of splats up to the end of each level. */
@@ -84,7 +84,7 @@ export async function* readSplatLevels(
       const rotations = await bytes("rotations");
       const scales = await bytes("scales");
       const opacities = await bytes("opacities");
-      const colors = await bytes("colours");
+      const colors = await bytes("colors");
       const records = encodeRecords(
         means,
         joinHighLowBytes(rotations),

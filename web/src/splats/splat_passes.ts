@@ -93,7 +93,7 @@ export class SplatPasses {
   /** Projects the splats in their order; returns the number of quads. */
   private project({ store, changed, camera, near, order, normals }: SplatDraw): number {
     const { gl } = this;
-    const { degree, antialiased, steps, log_scales: logs, colour_step: colorStep } = store.header;
+    const { degree, antialiased, steps, log_scales: logs, color_step: colorStep } = store.header;
     const count = order.numbers.length;
     if (count === 0) return 0;
     const { program, uniform } = this.programFor(`project${degree}${antialiased}${normals}`, () => {

@@ -307,7 +307,7 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     width: number,
     height: number,
     framebuffer: WebGLFramebuffer | null = null,
-    view: View = "colour",
+    view: View = "color",
   ): void {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);

@@ -9,7 +9,7 @@ const FORMS: [ExportSplats["form"], string][] = [
   ["spz", ".spz: a tenth of that"],
   ["sog", ".sog: for the web, smallest"],
   ["compressed.ply", ".compressed.ply: PlayCanvas"],
-  ["splat", ".splat: no view-dependent colour"],
+  ["splat", ".splat: no view-dependent color"],
   ["glb", ".glb: glTF"],
   ["usda", ".usda: USD text, largest"],
   ["usdc", ".usdc: USD, with usd-core"],

@@ -112,7 +112,7 @@ function rowKey(edit: EditState, index: number): string {
     index,
     edit.id,
     edit.name,
-    edit.colour,
+    edit.color,
     edit.kind,
     edit.enabled,
     edit.locked,
@@ -126,7 +126,7 @@ function row(app: App, edit: EditState, index: number): HTMLElement {
     app.send({ type: "change", edit: edit.id, ...what });
   };
   const swatch = h("span", { class: "swatch" });
-  swatch.style.background = edit.colour;
+  swatch.style.background = edit.color;
   const name = h(
     "span",
     { class: "name", title: "Double-click to rename" },

@@ -68,7 +68,7 @@ export function pathList(
         value: String(at),
         title: `How far “${edit.name}” has gone here`,
       });
-      slider.style.accentColor = edit.colour;
+      slider.style.accentColor = edit.color;
       slider.onchange = () => {
         slider.blur();
         send(replaced(index, { parts: { ...key.parts, [edit.id]: Number(slider.value) } }));
@@ -108,7 +108,7 @@ export function pathList(
         document.activeElement.type === "range")
     )
       return;
-    const named = state.edits.map(({ id, name, colour }) => [id, name, colour]);
+    const named = state.edits.map(({ id, name, color }) => [id, name, color]);
     const kept = rows;
     rows = new Map(
       state.keys.map((key, index) => {

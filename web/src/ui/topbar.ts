@@ -22,7 +22,7 @@ import type { Dialogs } from "./dialogs";
 import { h, iconButton, iconLink } from "./dom";
 
 const VIEWS: [View, string][] = [
-  ["colour", "Colour"],
+  ["color", "Color"],
   ["depth", "Depth"],
   ["opacity", "Opacity"],
   ["normals", "Normals"],

@@ -23,7 +23,7 @@ import type { Vec3 } from "./vectors";
 export interface SceneHeader {
   start: View;
   up: Vec3;
-  centre: Vec3;
+  center: Vec3;
   background: Vec3 | null;
   path: Path | null;
   /** Points with text; absent without any. */
@@ -88,7 +88,7 @@ export class SceneViewer {
     });
     if (!gl) throw new Error("This browser has no WebGL2, which the scene needs.");
     this.gl = gl;
-    this.orbit = new Orbit(header.start.c2w, header.up, header.centre);
+    this.orbit = new Orbit(header.start.c2w, header.up, header.center);
     this.fov = header.start.fov_y_deg;
     listenForMoves(canvas, {
       turn: (x, y) =>
@@ -218,7 +218,7 @@ export class SceneViewer {
     return Math.tan((this.fov * Math.PI) / 360);
   }
 
-  private look(view: View, around = this.header.centre): void {
+  private look(view: View, around = this.header.center): void {
     this.orbit = new Orbit(view.c2w, this.header.up, around);
     this.fov = view.fov_y_deg;
     this.invalidate();

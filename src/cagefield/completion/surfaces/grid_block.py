@@ -174,7 +174,7 @@ class GridBlock:
         return Cage.box(0.5 * (low + high), high - low), self.crop(first - 2, last + 2)
 
     def with_density(self, mask: Mask, density: Float32, *, slots: bool = False) -> GridBlock:
-        """Block with densities [N] at the vertices of a mask [X,Y,Z]; new vertices are grey.
+        """Block with densities [N] at the vertices of a mask [X,Y,Z]; new vertices are gray.
 
         An empty vertex gets no color except with `slots`: the color shows beside a surface.
         """

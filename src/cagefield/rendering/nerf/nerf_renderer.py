@@ -7,7 +7,7 @@ them; emptied samples have sigma 0. The coarse network's weights place the fine 
 the edited scene is.
 
 Normals are -J^T g / |J^T g| at the samples, g the gradient of sigma by canonical position (automatic
-differentiation) and J the edits' Jacobian, weighted like the colour.
+differentiation) and J the edits' Jacobian, weighted like the color.
 
 Without edits the sums are those of nerf-pytorch for the same rays. Source: Mildenhall et al., "NeRF" (2020),
 sections 4 and 5.2; Li & Pan, section 3 (sample points are deformed).
@@ -116,7 +116,7 @@ def trace(
     chunk: int = 2048,
     preserve_opacity: bool = True,
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """(premultiplied colour [N,3], opacity [N], depth [N]) of rays; depth is inf at opacity 0."""
+    """(premultiplied color [N,3], opacity [N], depth [N]) of rays; depth is inf at opacity 0."""
     return _traced(field, rays, edits, chunk, preserve_opacity, False)[:3]
 
 

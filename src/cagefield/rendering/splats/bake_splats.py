@@ -1,7 +1,7 @@
 """Edited splats as a field of their own, as a file of splats can hold them.
 
 Notation: J = d(deformed)/d(canonical) at a splat's mean, R diag(s) its own axes and scales. Its covariance
-becomes J C J^T = A A^T with A = J R diag(s) = U S V^T, so U are its new axes and S its new scales. Colour
+becomes J C J^T = A A^T with A = J R diag(s) = U S V^T, so U are its new axes and S its new scales. Color
 turns by P, the rotation of J's polar decomposition J = P (P^T J): see `sh_rotation`.
 
 Which splats move, which are copied and which are hidden: `moved_splats`; opacity: `deformed_splats`; those

@@ -46,7 +46,7 @@ class DiscProjection:
     near: float
 
     def picture(self, channels: int = DEPTH) -> Float32:
-        """The picture [H,W,channels] (T, colour, depth along the ray x weight, normals)."""
+        """The picture [H,W,channels] (T, color, depth along the ray x weight, normals)."""
         x, y, width, height = self.region
         out = np.empty((len(self.starts) - 1, channels, AREA), np.float32)
         discs.blend(

@@ -1,7 +1,7 @@
 """Splats in deformed space, the input of the rasterizer: those of a SplatField, deformed by edits.
 
 Notation: J = d(deformed)/d(canonical) at a splat's mean, J = R S its polar decomposition, C its covariance.
-An edit takes the mean along, C to J C J^T, and colour is evaluated at R^T d.
+An edit takes the mean along, C to J C J^T, and color is evaluated at R^T d.
 
 Opacity. A splat lets the ray through its mean lose the share o, whichever way the ray goes. With
 `preserve_opacity` a stretched density is multiplied by the stretch of the ray through it, so that ray
@@ -47,7 +47,7 @@ class DeformedSplats:
         opacities: [N] float32 in [0, 1].
         sh: [N, (degree+1)^2, 3] float32, as the field has them: evaluated along the canonical direction.
         rotations: [N,3,3] float32, or None where no splat was turned: R of J = R S, J = d(deformed) /
-            d(canonical) at the mean. The colour of splat n seen along d is that of its harmonics at R^T d.
+            d(canonical) at the mean. The color of splat n seen along d is that of its harmonics at R^T d.
         antialiased: as SplatField.
         tangents: [N,6] float32 of discs: a, b along their first two axes, each as long as its standard
             deviation; None where splats are no discs.

@@ -1,4 +1,4 @@
-"""Splats rasterised on the CPU: projected, sorted by depth, blended in tiles; the host side of the kernels.
+"""Splats rasterized on the CPU: projected, sorted by depth, blended in tiles; the host side of the kernels.
 
 A `Projection` is one camera's view of one set of splats; pictures, opacities along rays and gradients are
 asked of it.
@@ -55,7 +55,7 @@ _OPACITIES = np.interp(np.linspace(0.0, projection.DEEPEST, 1024), spence(1.0 - 
 """Opacities o at equal steps of Li2(o); scipy's `spence(1 - o)` is Li2(o)."""
 
 COLOR, DEPTH, NORMALS = 4, 5, 8
-"""Channels of a picture: T and colour; depth as well; normals as well."""
+"""Channels of a picture: T and color; depth as well; normals as well."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Projection:
         return len(self.starts) - 1
 
     def blend(self, channels: int = DEPTH) -> tuple[Float32, NDArray[np.int64]]:
-        """The picture [tiles,channels,AREA] (T, colour, depth x weight, normals), and where tiles end."""
+        """The picture [tiles,channels,AREA] (T, color, depth x weight, normals), and where tiles end."""
         out = np.empty((self.tiles, channels, AREA), np.float32)
         stops = np.empty(self.tiles, np.int64)
         blending.blend(self.packed, self.ids, self.starts, self.across, channels, stops, out)
@@ -118,7 +118,7 @@ class Projection:
     ) -> Float32:
         """Sums [pairs, SUMS] (see `blending`) for dL/d(picture) `slopes` [tiles,3,AREA].
 
-        `colour` [tiles,3,AREA] is the picture over its background, whose part in the gradient is included.
+        `color` [tiles,3,AREA] is the picture over its background, whose part in the gradient is included.
         `empty` [2,h,w] are distances along the picture's rays, at its size or smaller, up to which there is
         nothing, 0 where nobody knows, and how sure that is: each alpha before them adds that times `veil` to
         the loss. `weights` [tiles,AREA] scale the slopes; pixels of weight 0 count for nothing.
@@ -168,7 +168,7 @@ class Buffers:
         self._arrays: dict[str, NDArray[Any]] = {}
 
     def take(self, name: str, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
-        """An uninitialised array; the same memory as long as it is large enough."""
+        """An uninitialized array; the same memory as long as it is large enough."""
         size = int(np.prod(shape))
         found = self._arrays.get(name)
         if found is None or found.size < size or found.dtype != dtype:

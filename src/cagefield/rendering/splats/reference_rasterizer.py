@@ -28,7 +28,7 @@ LEAST_COMPENSATION = 0.005
 class ProjectedSplats:
     """The splats in front of a camera, near to far.
 
-    rows [N] which they are; means [N,2] in pixels; conics [N,2,2]; opacities [N]; colours [N,3]; distances
+    rows [N] which they are; means [N,2] in pixels; conics [N,2,2]; opacities [N]; colors [N,3]; distances
     [N] along the ray at the mean, and their slopes [N,2] per pixel.
     """
 
@@ -74,7 +74,7 @@ def project(
 
 
 def blend(projected: ProjectedSplats, width: int, height: int) -> tuple[AnyArray, AnyArray, AnyArray]:
-    """(colour [H,W,3] without background, T [H,W], depth times weight [H,W])."""
+    """(color [H,W,3] without background, T [H,W], depth times weight [H,W])."""
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     color, through, depth = np.zeros((height, width, 3)), np.ones((height, width)), np.zeros((height, width))
     for n in range(len(projected.rows)):

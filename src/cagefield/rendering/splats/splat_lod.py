@@ -62,7 +62,7 @@ class View:
         *,
         pinhole: bool,
     ) -> View:
-        """The view of a camera's region: centre [2] and size in pixels of the region, `limits` of n.
+        """The view of a camera's region: center [2] and size in pixels of the region, `limits` of n.
 
         A splat at (x, y, z) with the variance s^2 at most reaches r (f sqrt(1 + n^2) s / z + sqrt(BLUR))
         pixels from its mean, r <= FARTHEST. Points right of the left edge have f x + (c + r sqrt(BLUR)) z

@@ -1,4 +1,4 @@
-"""SplatRenderer: pictures of a SplatField seen through its edits, by the rasteriser."""
+"""SplatRenderer: pictures of a SplatField seen through its edits, by the rasterizer."""
 
 from __future__ import annotations
 

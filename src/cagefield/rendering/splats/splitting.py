@@ -2,7 +2,7 @@
 a shadow goes through it.
 
 Notation: a splat is m + A z, z ~ N(0, 1) in three dimensions, A = Q diag(s). An edit takes it to
-F(m) + J A z, which is right as far as F is affine over it, and in one colour. Three things are not:
+F(m) + J A z, which is right as far as F is affine over it, and in one color. Three things are not:
 
 - Bending. Along the axis a_i of A the second-order term of F at two standard deviations, against the length
   of the first-order term, is
@@ -27,7 +27,7 @@ F(m) + J A z, which is right as far as F is affine over it, and in one colour. T
   the optical depth T(u) = -log(1 - a exp(-u^2 / 2)), a the opacity. A child has the integral, mean and
   variance over u of T below or above t, and across u the width that gives it T's integral over that half of a
   plane. Of faint splats T is a normal distribution, and children have its moments where it is cut off.
-- Light. A patch (`edits.patch`) multiplies a splat's colours by one number. Where the log of that changes by
+- Light. A patch (`edits.patch`) multiplies a splat's colors by one number. Where the log of that changes by
   d > SHADE among m - a_i, m and m + a_i the splat becomes a row along a_i as where it bends, with
   r = SHADE / d, faint ones where it changes by more. It does not where a_i is shorter than half an edge of
   the light's grid.

@@ -1,7 +1,7 @@
 """A VoxelField on the compute device: arrays, and the kernel functions that sample it.
 
 Notation: g = grid coordinates (0 at the first vertex), *cell* = the cube between 8 vertices, *brick* =
-4 x 4 x 4 cells. A vertex is stored under a *slot*; slot 0 is the empty vertex (density 0, colour 0), so a
+4 x 4 x 4 cells. A vertex is stored under a *slot*; slot 0 is the empty vertex (density 0, color 0), so a
 lookup needs no branch. Records are padded: `sh` has `sh_stride(K)` floats a slot, basis-major, rgb inner.
 """
 
@@ -54,7 +54,7 @@ class DeviceGrid:
 
     @classmethod
     def from_field(cls, field: VoxelField) -> DeviceGrid:
-        """The arrays of a field, its slots ordered by brick so that neighbours lie close in memory."""
+        """The arrays of a field, its slots ordered by brick so that neighbors lie close in memory."""
         vertices, density, sh = _by_brick(field)
         index = np.zeros(int(np.prod(field.resolution)), np.int32)
         index[vertices] = np.arange(1, len(vertices) + 1, dtype=np.int32)

@@ -1,7 +1,7 @@
 """Occupied blocks under maps that do not jump, from the images of a lattice's points.
 
-Each point is mapped once; how far its surroundings reach in canonical space is read off its neighbours'
-images q: along axis a as far as to the farther neighbour's, halved, and summed over the axes,
+Each point is mapped once; how far its surroundings reach in canonical space is read off its neighbors'
+images q: along axis a as far as to the farther neighbor's, halved, and summed over the axes,
 
     r = sum_a max(|q_(+a) - q|, |q - q_(-a)|) / 2.
 

@@ -16,8 +16,8 @@ from cagefield.scene.hotspots import Hotspot
 from cagefield.selection.element_selection import Selection
 from cagefield.server.editor.hotspot_list import HotspotList, numbered
 
-COLOURS = ("#4cc2ff", "#ffb14c", "#7ee081", "#ff7eb6", "#c9a7ff", "#f4e04d", "#5ce0d0", "#ff8a66")
-"""Colours of cage pairs."""
+COLORS = ("#4cc2ff", "#ffb14c", "#7ee081", "#ff7eb6", "#c9a7ff", "#f4e04d", "#5ce0d0", "#ff8a66")
+"""Colors of cage pairs."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Entry:
 
     id: int
     edit: Edit
-    colour: str
+    color: str
     locked: bool = False
     spare: Spare = Spare()
 
@@ -72,7 +72,7 @@ class Document:
         """The document of an edit stack, its edits and hotspots numbered from 1."""
         document = cls((), preserve_opacity, keys, loop, None, removed, meters_per_unit, numbered(hotspots))
         for number, edit in enumerate(edits, start=1):
-            document = document.insert(Entry(number, edit, document.next_colour))
+            document = document.insert(Entry(number, edit, document.next_color))
         return document
 
     @property
@@ -103,10 +103,10 @@ class Document:
         )
 
     @property
-    def next_colour(self) -> str:
-        """The first of the colours that the fewest entries have: the same edits in order get the same."""
-        taken = [entry.colour for entry in self.entries]
-        return min(COLOURS, key=taken.count)
+    def next_color(self) -> str:
+        """The first of the colors that the fewest entries have: the same edits in order get the same."""
+        taken = [entry.color for entry in self.entries]
+        return min(COLORS, key=taken.count)
 
     def place(self, number: int) -> int:
         """Where in the list the edit of that number is. Raises EditError where it is not there any more."""

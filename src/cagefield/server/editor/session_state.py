@@ -263,7 +263,7 @@ class SessionState:
     def _entry(self, edit: Edit, document: Document) -> Entry:
         number = self._next
         self._next += 1
-        return Entry(number, edit, document.next_colour)
+        return Entry(number, edit, document.next_color)
 
     def _add(self, name: str, edit: Edit, at: int | None = None) -> int:
         entry = self._entry(edit, self.document)

@@ -38,7 +38,7 @@ class DisplayMessage(Message):
     """Display of a view; `before` leaves the edits out, `split` left of a share of the width."""
 
     type: Literal["display"] = "display"
-    view: View = "colour"
+    view: View = "color"
     before: bool = False
     split: Annotated[float, Field(ge=0, le=1)] | None = None
 

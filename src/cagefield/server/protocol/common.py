@@ -33,7 +33,7 @@ Affine: TypeAlias = Annotated[list[FiniteFloat], Field(min_length=12, max_length
 """An affine map: a matrix [3,4], row by row."""
 Pose: TypeAlias = Annotated[list[FiniteFloat], Field(min_length=16, max_length=16)]
 Axes: TypeAlias = Literal["world", "cage"]
-View: TypeAlias = Literal["colour", "depth", "opacity", "normals"]
+View: TypeAlias = Literal["color", "depth", "opacity", "normals"]
 DrawnHere: TypeAlias = Literal["nothing", "moving", "all"]
 ShellName: TypeAlias = Literal["flow", "trilinear"]
 FalloffName: TypeAlias = Literal["smooth", "linear"]

@@ -153,7 +153,7 @@ def edit_state(
     return server_messages.EditState(
         id=entry.id,
         name=edit.name,
-        colour=entry.colour,
+        color=entry.color,
         enabled=edit.enabled,
         locked=entry.locked,
         kind=kind_of(edit),

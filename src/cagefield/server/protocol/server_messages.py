@@ -75,7 +75,7 @@ class EditState(Message):
 
     id: EditId
     name: str
-    colour: str
+    color: str
     enabled: bool
     locked: bool
     kind: Kind

@@ -95,12 +95,12 @@ def tiles(part: tuple[int, int, int, int], count: float) -> list[tuple[int, int,
         if x1 > x0 and y1 > y0
     ]
 
-    def off_centre(tile: tuple[int, int, int, int]) -> float:
+    def off_center(tile: tuple[int, int, int, int]) -> float:
         dx = (tile[0] + 0.5 * tile[2] - x) / width - 0.5
         dy = (tile[1] + 0.5 * tile[3] - y) / height - 0.5
         return dx * dx + dy * dy
 
-    return sorted(found, key=off_centre)
+    return sorted(found, key=off_center)
 
 
 @dataclass

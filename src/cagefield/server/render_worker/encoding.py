@@ -21,12 +21,12 @@ MAX_PLAIN_PIXELS = 16_384
 Format = Literal["jpeg", "rgb"]
 
 BEHIND = (0.13, 0.13, 0.15)
-"""Colour behind a scene that has none."""
+"""Color behind a scene that has none."""
 
 
 def picture_of(frame: RenderResult, view: View, reach: tuple[float, float]) -> NDArray[np.uint8]:
     """RGB pixels [H,W,3] of a view; `reach` (near, far) are the distances shown bright and dark."""
-    if view == "colour":
+    if view == "color":
         return frame.rgb8() if frame.background is not None else frame.over(BEHIND).rgb8()
     opacity = frame.opacity[..., None]
     if view == "opacity":
@@ -48,7 +48,7 @@ def plain_or_jpeg(pixels: NDArray[np.uint8], quality: int) -> tuple[bytes, Forma
 
 
 def jpeg(pixels: NDArray[np.uint8], quality: int) -> bytes:
-    """A JPEG; at qualities of 90 and more the colours have full resolution too."""
+    """A JPEG; at qualities of 90 and more the colors have full resolution too."""
     stream = io.BytesIO()
     Image.fromarray(pixels).save(
         stream, format="JPEG", quality=quality, subsampling=0 if quality >= 90 else 2

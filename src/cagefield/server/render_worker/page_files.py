@@ -99,7 +99,7 @@ class PageFiles:
 
         None is split while something moves.
 
-        Raises CagefieldError for pastes, whose colours a page that has loaded its splats does not have.
+        Raises CagefieldError for pastes, whose colors a page that has loaded its splats does not have.
         """
         if any(isinstance(edit, Paste) for edit in shown):
             raise CagefieldError("the server draws what is pasted between scenes of splats")

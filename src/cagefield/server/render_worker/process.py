@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 TO_END = 10.0
 """Seconds that a process that has its scene may take to end: then it keeps the kernels that it compiled."""
 
-Colour = tuple[float, float, float] | None
+Color = tuple[float, float, float] | None
 
 _LOST = (EOFError, OSError)
 """Errors of sending to, and receiving from, a process that has ended."""
@@ -45,7 +45,7 @@ def serve(
     scene: str,
     device: str,
     files: object = None,
-    background: Colour = None,
+    background: Color = None,
 ) -> None:
     """Does tasks until one is None or the pipe closes; an error of a task becomes `Failed`.
 
@@ -146,8 +146,8 @@ class Worker:
         """The folder that is read when the process starts."""
         self.files: object = None
         """The states that its files have as long as it is the scene that is edited; None for any."""
-        self.background: Colour = None
-        """The colour behind the scene that is edited."""
+        self.background: Color = None
+        """The color behind the scene that is edited."""
         self.write_opened: Callable[[Path], None] | None = None
         """Writes the scene that is edited as another folder."""
         self._device = device

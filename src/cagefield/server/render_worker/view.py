@@ -11,7 +11,7 @@ from cagefield.server.protocol.common import View
 class Display:
     """Display of a view: without the edits where `before`, or left of `split` (0 to 1)."""
 
-    view: View = "colour"
+    view: View = "color"
     before: bool = False
     split: float | None = None
 

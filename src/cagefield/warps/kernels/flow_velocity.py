@@ -130,7 +130,7 @@ def straighten(y: vec3, start: vec3, lattice: qd.template(), K: qd.i32, precise:
             if share < 0.01:
                 if size < 1e-3 * (1.0 + qd.abs(y).max()) or tried == STARTS:
                     break
-                # The centre, then the corners of a cube twice as large.
+                # The center, then the corners of a cube twice as large.
                 best = vec3(0.0, 0.0, 0.0)
                 if tried > 0:
                     n = tried - 1

@@ -1,4 +1,4 @@
-"""The flow shell's velocity in plain numbers and without branches, for loops that compilers vectorise.
+"""The flow shell's velocity in plain numbers and without branches, for loops that compilers vectorize.
 
 Vectors are three numbers (x, y, z); z are the coordinates of the outer cage, xi those of the inner one. The
 tables are those of `flow_table`; the same mathematics for one sample, in vectors, is in

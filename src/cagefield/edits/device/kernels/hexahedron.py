@@ -102,7 +102,7 @@ def in_box(p: vec3, params: qd.template(), e: qd.i32, at: qd.i32):
 
 @qd.func
 def read3(params: qd.template(), e: qd.i32, at: qd.i32):
-    """Three neighbouring columns as a vector."""
+    """Three neighboring columns as a vector."""
     return vec3(params[e, at], params[e, at + 1], params[e, at + 2])
 
 

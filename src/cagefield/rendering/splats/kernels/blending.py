@@ -2,7 +2,7 @@
 
 Notation: at a pixel, splat k (near to far) has alpha a_k = o exp(-d^T Q d / 2), d the pixel minus the
 projected mean, d^T Q d = A (x + k y)^2 + D y^2. With T_k the product of (1 - a_j) over the nearer ones and
-w_k = a_k T_k, the pixel's colour is sum_k w_k c_k + T b, b the background.
+w_k = a_k T_k, the pixel's color is sum_k w_k c_k + T b, b the background.
 
 One flat loop over the pixels of the rows that a splat reaches vectorizes: state lies in one buffer at
 constant offsets, exp is a polynomial, and there are selections in place of branches. A tile is left once all
@@ -73,7 +73,7 @@ def coordinates(state):
 
 @njit(**FAST)
 def blend_tile(state, packed, ids, begin, end, x0, y0, with_depth):
-    """Rows of the state: 0 T, 1-3 colour, 4 depth times weight. Returns where the tile was left."""
+    """Rows of the state: 0 T, 1-3 color, 4 depth times weight. Returns where the tile was left."""
     for i in range(AREA):
         state[i] = ONE
     for i in range(AREA, 5 * AREA):
@@ -148,7 +148,7 @@ def blend_normals_tile(state, packed, ids, begin, end, x0, y0):
 
 @parallel_njit(lambda packed, ids, starts, *_: starts.size - 1, **FAST)
 def blend(begin, end, packed, ids, starts, across, channels, stops, out):
-    """Blends all tiles into out [tiles, channels, AREA]: T, colour (3), depth (of 5), normals (of 8)."""
+    """Blends all tiles into out [tiles, channels, AREA]: T, color (3), depth (of 5), normals (of 8)."""
     state = np.empty(ROWS * AREA, nb.float32)
     for t in range(begin, end):
         coordinates(state)
@@ -167,7 +167,7 @@ def blend(begin, end, packed, ids, starts, across, channels, stops, out):
 
 @njit(**FAST)
 def influence_tile(state, packed, ids, begin, end, x0, y0):
-    """Adds up |alpha dC/dalpha| of a tile's splats in row 7; uses up rows 0 (T) and 4-6 (colour to come)."""
+    """Adds up |alpha dC/dalpha| of a tile's splats in row 7; uses up rows 0 (T) and 4-6 (color to come)."""
     for e in range(begin, end):
         p = packed[ids[e]]
         mx, my = p[0] - F(x0), p[1] - F(y0)
@@ -198,7 +198,7 @@ def influence_tile(state, packed, ids, begin, end, x0, y0):
 def gradient_tile(state, packed, ids, begin, end, x0, y0, sums):
     """Sums of a tile's pairs.
 
-    Rows of the state: 0 T, 1-3 dL/dC, 4-6 colour to come, background too, 7 influence, 10 distance that is
+    Rows of the state: 0 T, 1-3 dL/dC, 4-6 color to come, background too, 7 influence, 10 distance that is
     empty, 11 cost of an alpha there.
     """
     for e in range(begin, end):
@@ -270,7 +270,7 @@ def gradient_tile(state, packed, ids, begin, end, x0, y0, sums):
 def gradients(
     begin, end, packed, ids, starts, stops, width, height, color, slopes, weights, empty, veil, sums
 ):
-    """The sums of all pairs [pairs, SUMS]: colour [tiles,3,AREA] is the picture, slopes dL/d(picture).
+    """The sums of all pairs [pairs, SUMS]: color [tiles,3,AREA] is the picture, slopes dL/d(picture).
 
     `weights` [tiles,AREA] scale the slopes; pixels of weight 0 count for nothing, nor does their curvature.
     `empty` [2,h,w], of the picture's shape but maybe smaller, are distances along its rays up to which there
@@ -311,7 +311,7 @@ def gradients(
 
 @parallel_njit(lambda *args: len(args[-1]), **FAST)
 def opacity_before(begin, end, packed, ids, starts, across, pixels, distances, out):
-    """Opacity [K] that rays through pixels [K,2] (x, y, centres at .5) have gathered before distances [K]."""
+    """Opacity [K] that rays through pixels [K,2] (x, y, centers at .5) have gathered before distances [K]."""
     for n in range(begin, end):
         x, y = pixels[n, 0] - HALF, pixels[n, 1] - HALF
         t = int(pixels[n, 1]) // TILE_PX * across + int(pixels[n, 0]) // TILE_PX

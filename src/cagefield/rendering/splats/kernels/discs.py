@@ -200,7 +200,7 @@ def alpha_at(p, dx, dy, near):
 
 @njit(**FAST)
 def blend_tile(state, packed, ids, begin, end, x0, y0, near):
-    """Rows of the state: 0 T, 1-3 colour, 4 depth z times weight. Returns where the tile was left."""
+    """Rows of the state: 0 T, 1-3 color, 4 depth z times weight. Returns where the tile was left."""
     for i in range(AREA):
         state[i] = ONE
     for i in range(AREA, 5 * AREA):
@@ -250,7 +250,7 @@ def blend_normals_tile(state, packed, ids, begin, end, x0, y0, near):
 
 @parallel_njit(lambda packed, ids, starts, *_: starts.size - 1, **FAST)
 def blend(begin, end, packed, ids, starts, across, near, channels, out):
-    """Blends all tiles into out [tiles, channels, AREA]: T, colour (3), depth z (of 5), normals (of 8)."""
+    """Blends all tiles into out [tiles, channels, AREA]: T, color (3), depth z (of 5), normals (of 8)."""
     state = np.empty(ROWS * AREA, nb.float32)
     for t in range(begin, end):
         coordinates(state)
@@ -268,7 +268,7 @@ def blend(begin, end, packed, ids, starts, across, near, channels, out):
 
 @parallel_njit(lambda *args: len(args[-1]), **FAST)
 def opacity_before(begin, end, packed, ids, starts, across, near, pixels, depths, out):
-    """Opacity [K] that rays through pixels [K,2] (x, y, centres at .5) have gathered before depths z [K]."""
+    """Opacity [K] that rays through pixels [K,2] (x, y, centers at .5) have gathered before depths z [K]."""
     for n in range(begin, end):
         x, y = pixels[n, 0] - HALF, pixels[n, 1] - HALF
         t = int(pixels[n, 1]) // TILE_PX * across + int(pixels[n, 0]) // TILE_PX

@@ -1,4 +1,4 @@
-"""Splats onto a picture: projected means, covariances, colours, and the tiles that each one touches (Numba).
+"""Splats onto a picture: projected means, covariances, colors, and the tiles that each one touches (Numba).
 
 Notation: a splat's mean is p in camera axes (x right, y down, z forward), C its covariance in the world, W
 the world-to-camera rotation. The lens maps n = (x/z, y/z) to d(n), and the pixel is (fx d_x + cx, fy d_y +
@@ -37,9 +37,9 @@ LEAST_COMPENSATION = 0.005
 PINHOLE, OPENCV, FISHEYE = 0, 1, 2
 
 PACKED = 16
-"""Floats a packed splat has, one cache line: 0-1 mean (pixel centres at whole numbers), 2-4 conic A, k, D
+"""Floats a packed splat has, one cache line: 0-1 mean (pixel centers at whole numbers), 2-4 conic A, k, D
 (the quadratic form is A (x + k y)^2 + D y^2: no difference of large numbers far from the mean), 5 opacity,
-6-8 colour, 9 half-height of the region above ALPHA_MIN, 10 distance along the ray at the mean, 11-12 its
+6-8 color, 9 half-height of the region above ALPHA_MIN, 10 distance along the ray at the mean, 11-12 its
 slope
 per pixel, 13-15 normal."""
 

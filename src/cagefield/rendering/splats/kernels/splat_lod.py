@@ -24,7 +24,7 @@ from cagefield.compute.parallel_kernels import parallel_njit
 from cagefield.rendering.splats.kernels.projection import ALPHA_MAX, ALPHA_MIN, MAX_WORLD_VARIANCE
 
 CLUSTER_FLOATS = 7
-"""Floats of a cluster: 0-2 centre and 3-5 half-size of the box of its means, 6 the largest distance from its
+"""Floats of a cluster: 0-2 center and 3-5 half-size of the box of its means, 6 the largest distance from its
 mean, in world units, at which one of its splats still shows."""
 
 FARTHEST = np.sqrt(-2.0 * np.log(ALPHA_MIN))

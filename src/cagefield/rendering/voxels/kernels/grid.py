@@ -108,7 +108,7 @@ def gather_density(density: qd.template(), slots: ivec8, w: vec8):
 
 @qd.func
 def gather_rgb(sh: qd.template(), slots: ivec8, w: vec8, basis: qd.template(), K: qd.template()):
-    """Interpolated colour, 0.5 added, before the clamp to [0, 1]."""
+    """Interpolated color, 0.5 added, before the clamp to [0, 1]."""
     rgb = vec3(0.5, 0.5, 0.5)
     for c in qd.static(range(8)):
         if slots[c] > 0:
@@ -140,7 +140,7 @@ def to_world(g: vec3, grid: GridArgs, contracted: qd.template()):
 
 @qd.func
 def contract(q: vec3):
-    """Contracted position of a normalised one (`cagefield.fields.contraction.contract`)."""
+    """Contracted position of a normalized one (`cagefield.fields.contraction.contract`)."""
     m = qd.max(qd.abs(q).max(), 1.0)
     return ((2.0 - 1.0 / m) / m) * q
 

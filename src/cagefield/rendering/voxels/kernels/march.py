@@ -257,7 +257,7 @@ def march_tiles(
 
 @qd.func
 def pull_back(slope: vec3, q: vec3):
-    """Gradient with respect to the normalised position q of a gradient with respect to contract(q)."""
+    """Gradient with respect to the normalized position q of a gradient with respect to contract(q)."""
     return vec3(
         slope.dot(contract_velocity(q, vec3(1.0, 0.0, 0.0))),
         slope.dot(contract_velocity(q, vec3(0.0, 1.0, 0.0))),

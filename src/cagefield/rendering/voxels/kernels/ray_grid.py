@@ -85,13 +85,13 @@ def look_ahead(
 ):
     """(g, h, empty, leap, last) at a point q of a ray with velocity gd and its inverse.
 
-    q and gd are in grid coordinates or, when contracted, normalised ones; half = (resolution - 1) / 4.
+    q and gd are in grid coordinates or, when contracted, normalized ones; half = (resolution - 1) / 4.
     g: grid coordinates of q. h: ray parameter of one step. empty: 1 where the block around q is. leap: the
     ray parameter to go on by then, whole steps if bounded. last: 1 from half a voxel before infinity on,
     where a contracted march ends.
 
     A contracted ray is bent outside the inner box: it goes half of the straight run there, and no farther
-    than a quarter of the way to the centre. Inside, the next sample is amid the first step after the run: at
+    than a quarter of the way to the center. Inside, the next sample is amid the first step after the run: at
     its end all the samples that follow would lie on faces of cells, where the gradient jumps.
     """
     g = q
