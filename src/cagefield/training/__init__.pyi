@@ -5,6 +5,8 @@ from .nerf.train_nerf import NerfResult as NerfResult
 from .nerf.train_nerf import train_nerf as train_nerf
 from .result import TrainResult as TrainResult
 from .splats.splat_config import SplatConfig as SplatConfig
+from .splats.train_blocks import plan_blocks as plan_blocks
+from .splats.train_blocks import train_blocks as train_blocks
 from .splats.train_splats import train_splat as train_splat
 from .voxels.train_voxels import train_voxel as train_voxel
 from .voxels.voxel_config import VoxelConfig as VoxelConfig
