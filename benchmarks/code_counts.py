@@ -23,7 +23,7 @@ from benchmarks.common.tables import Table, write_text
 from cagefield.errors import CagefieldError
 
 BRITISH = re.compile(
-    r"color|center|gray|neighbor|behaviour|licence"
+    r"colour|centre|grey|neighbour|behaviour|licence"
     r"|(raster|vector|quant|normal|initial|real|voxel|serial|optim|minim|maxim|regular|summar|local|linear)"
     r"is(e|ed|er|es|ing|ation)"
 )

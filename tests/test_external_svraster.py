@@ -114,6 +114,7 @@ def test_files_that_do_not_fit_are_refused(tmp_path: Path, content: dict[str, An
         read_external(write_svraster(tmp_path / "a.pt", content))
 
 
+@pytest.mark.nightly  # two minutes of fitting
 def test_the_command_bakes_and_exports_splats(tmp_path: Path) -> None:
     """A field of a checkpoint as a scene, and splats fitted to its voxels as an export."""
     solid = svraster_content(outside=0, values=lambda points: np.where(points[:, 2] < 0.1, 1.0, -9.0))
@@ -126,6 +127,6 @@ def test_the_command_bakes_and_exports_splats(tmp_path: Path) -> None:
     written = read_splats(splats)
     positions = written.means
     assert len(positions) > 50
-    # the lower half of the cube is solid: an edge of half the length, up to a voxel of the bake on each side
+    # the lower half of the cube is solid: an edge of half the length, up to two voxels on each side
     spans = np.sort(np.quantile(positions, 0.98, axis=0) - np.quantile(positions, 0.02, axis=0))
-    assert spans[0] < INSIDE / 2 + 2 * INSIDE / 24 and spans[2] > 0.6 * INSIDE
+    assert spans[0] < INSIDE / 2 + 4 * INSIDE / 24 and spans[2] > 0.6 * INSIDE

@@ -90,7 +90,7 @@ def test_counts_find_cases(tmp_path: Path) -> None:
     (package / "__init__.py").write_text('"""What a toy is. A plain sentence; one with what it does."""\n')
     (package / "one.py").write_text(
         '"""Toy module."""\n\nfrom toy import two\n\nREACH = 1\n\n\n'
-        "def of(color, b, c):\n    return two.REACH\n"
+        "def of(colour, b, c):\n    return two.REACH\n"
     )
     (package / "two.py").write_text('"""Other module."""\n\nREACH = 2\n')
     toy = SourceTree.parse(package)

@@ -12,7 +12,7 @@ import pytest
 from cagefield.edits import Edit, parse_edits
 from cagefield.errors import EditFileError
 from cagefield.scene.scene import Scene
-from cagefield.server.editor import edit_texts, session, validity
+from cagefield.server.editor import edit_texts, session_state, validity
 from cagefield.server.editor.edit_texts import read_edits
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
@@ -92,7 +92,7 @@ def test_problems_of_many_edits_are_found_once(tmp_path: Path, monkeypatch: pyte
         return validity.problem(edit)
 
     monkeypatch.setattr(edit_texts, "problem", counting)
-    monkeypatch.setattr(session, "problem", counting)
+    monkeypatch.setattr(session_state, "problem", counting)
     ball_scene().save(tmp_path / "scene")
     scene = Scene.open(tmp_path / "scene")
     store = SceneStore(scene, tmp_path / "scene")

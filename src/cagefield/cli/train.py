@@ -155,6 +155,12 @@ class Train:
 
     def _check_options(self) -> None:
         """Refuses, before photos are read, options that no trainer in question takes."""
+        if self.blocks is not None:
+            from cagefield.training.splats.blocks import check_count
+            from cagefield.training.splats.train_blocks import check_shared_poses
+
+            check_count(self.blocks)
+            check_shared_poses(self.blocks, self.refine_poses)
         if self.cluster is not None:
             from cagefield.cluster.connection import check_installed, parse_cluster
 

@@ -83,7 +83,9 @@ export class Hotspots {
   private mark(hotspot: HotspotState, index: number): HTMLButtonElement {
     const onclick = (): void =>
       isReadOnly(this.app.store.now) ? this.look(hotspot) : this.dialogs.hotspot(hotspot);
-    return h("button", { type: "button", title: hotspot.title, onclick }, String(index + 1));
+    const mark = h("button", { type: "button", title: hotspot.title, onclick }, String(index + 1));
+    mark.hidden = true; // until it has its place
+    return mark;
   }
 
   /** Looks from the hotspot's camera, or turns the present view to it. */

@@ -283,7 +283,8 @@ def _parted(
     across = children.across[:, None]
     shape = across[:, None] * A + ((children.r[:, None] - across) * along)[:, :, None] * h[:, None, :]
     variances, U = np.linalg.eigh(shape @ shape.transpose(0, 2, 1))
-    s = np.sqrt(np.maximum(variances, 0.0))
+    # The shortest axis last: that of a disc is its normal.
+    s, U = np.sqrt(np.maximum(variances[:, ::-1], 0.0)), np.ascontiguousarray(U[:, :, ::-1])
     U[:, :, 2] *= np.linalg.det(U)[:, None]
     stay = np.ones(len(field), bool)
     stay[parents] = False

@@ -73,8 +73,7 @@ def divide(dataset: Dataset, points: SparsePoints, count: int) -> tuple[Block, .
     Raises:
         CagefieldError: a number of blocks that is out of range, blocks that no photo sees.
     """
-    if not 1 <= count <= MAX_BLOCKS:
-        raise CagefieldError(f"blocks is {count}; give a number from 1 to {MAX_BLOCKS}")
+    check_count(count)
     everything = np.array([[-np.inf] * 3, [np.inf] * 3])
     if count == 1:
         photos, rows = tuple(range(len(dataset.train))), np.arange(len(points))
@@ -105,6 +104,12 @@ def divide(dataset: Dataset, points: SparsePoints, count: int) -> tuple[Block, .
         inside = int(inside_cell(core, points.positions).sum())
         blocks.append(Block(core, region, photos, shared, inside, int(rows.sum())))
     return tuple(blocks)
+
+
+def check_count(count: int) -> None:
+    """Raises CagefieldError for a number of blocks that is out of range."""
+    if not 1 <= count <= MAX_BLOCKS:
+        raise CagefieldError(f"blocks is {count}; give a number from 1 to {MAX_BLOCKS}")
 
 
 def partition(positions: Array, count: int) -> list[Array]:

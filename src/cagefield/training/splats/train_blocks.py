@@ -74,6 +74,14 @@ Trainer = Callable[[Sequence[BlockJob]], Iterable[BlockJob]]
 """Trains blocks into their files; yields each one that is finished."""
 
 
+def check_shared_poses(count: int, refine_poses: bool) -> None:
+    """Raises CagefieldError where several blocks would refine the poses of photos that they share."""
+    if refine_poses and count > 1:
+        raise CagefieldError(
+            "blocks would move a shared photo's camera to different places; leave out --refine-poses"
+        )
+
+
 def plan_blocks(
     dataset: Dataset, config: SplatConfig, count: int, folder: Path, on_stage: OnStage | None = None
 ) -> tuple[tuple[Block, ...], tuple[BlockJob, ...]]:
@@ -82,10 +90,7 @@ def plan_blocks(
     Raises:
         CagefieldError: too few points or photos for so many blocks, options that blocks cannot share.
     """
-    if config.refine_poses and count > 1:
-        raise CagefieldError(
-            "blocks would move a shared photo's camera to different places; leave out --refine-poses"
-        )
+    check_shared_poses(count, config.refine_poses)
     points = starting_points(
         dataset,
         points_cache_folder(),
