@@ -19,7 +19,7 @@ from cagefield.cluster.frame_tasks import FrameJob, FrameResult, fit_depth_scale
 from cagefield.cluster.scene_archive import SceneArchive, SceneSource
 from cagefield.cluster.tasks import RETRIES, results_of, warned_losses
 from cagefield.errors import CagefieldError
-from cagefield.files.stale_files import hidden_name
+from cagefield.files.stale_files import hidden_name, remove_unfinished
 from cagefield.images.pictures import DepthScale
 from cagefield.scene.frames import FrameOptions
 from cagefield.scene.scene import Scene
@@ -93,6 +93,7 @@ def open_frame_cluster(
     mark = folder / hidden_name(folder / f"mark{uuid.uuid4().hex[:8]}", "part")
     job = FrameJob(source, options, device, folder.absolute(), mark.name)
     with ExitStack() as opened:
+        opened.callback(remove_unfinished, folder)  # of lost workers on this machine
         client = opened.enter_context(connect(cluster, tls))
         mark.touch()
         opened.callback(mark.unlink, missing_ok=True)
