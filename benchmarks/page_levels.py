@@ -21,18 +21,17 @@ import tyro
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from PIL import Image
-from playwright.sync_api import sync_playwright
 
 from benchmarks.common.machine import cpu_model
 from benchmarks.slow_line import served
 from benchmarks.splat_landscape import landscape
+from benchmarks.throttled_page import throttled_page
 from cagefield.cameras.camera import Camera
 from cagefield.fields.splat_field import SplatField
 from cagefield.images.metrics import psnr
 from cagefield.pages.page_splats import FIRST, decode_page_splats, page_order
 from cagefield.pages.scene_page import INDEX, ScenePage, write_folder
 from cagefield.scene.scene import Scene
-from editor_page import CHROMIUM, FLAGS
 
 PATIENCE = 600.0
 FIRST_AT = """
@@ -115,21 +114,7 @@ class PageLevels:
 
     def _first(self, link: str) -> tuple[int, float]:
         """(bytes received, seconds) until the first picture."""
-        with sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-            page = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
-            session: Any = page.context.new_cdp_session(page)
-            session.send("Network.enable")
-            rate = self.mbit * 1e6 / 8
-            session.send(
-                "Network.emulateNetworkConditions",
-                {
-                    "offline": False,
-                    "latency": self.latency,
-                    "downloadThroughput": rate,
-                    "uploadThroughput": rate,
-                },
-            )
+        with throttled_page(self.mbit, self.latency, SIZE) as (page, session):
             page.add_init_script(FIRST_AT)
             times: list[tuple[float, int]] = []
             begun: list[float] = []
@@ -144,7 +129,6 @@ class PageLevels:
                     raise SystemExit("no first picture")
                 time.sleep(0.2)
             page.evaluate("0")  # the events until now have arrived
-            browser.close()
         seconds = first / 1e3
         return sum(size for at, size in times if at - begun[0] <= seconds), seconds
 

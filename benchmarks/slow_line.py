@@ -22,19 +22,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from playwright.sync_api import sync_playwright
 
 from benchmarks.common.machine import cpu_model
+from benchmarks.throttled_page import throttled_page
 from cagefield.pages.page_file import bytes_until
 from cagefield.pages.scene_page import INDEX, NAMES, SCRIPT, ScenePage, write_folder
 from cagefield.scene.scene import Scene
-from editor_page import CHROMIUM, FLAGS, asking
+from editor_page import asking
 
 PATIENCE = 300.0
 LEVEL = "window.cagefieldViewer?.viewer?.renderer?.level"
@@ -125,21 +125,7 @@ class SlowLine:
 
     def _shown(self, link: str, conditions: tuple[str, ...]) -> list[float]:
         """Seconds from the address to each of these conditions of the page."""
-        with sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-            page = browser.new_page(viewport={"width": 500, "height": 420})
-            session: Any = page.context.new_cdp_session(page)
-            session.send("Network.enable")
-            rate = self.mbit * 1e6 / 8
-            session.send(
-                "Network.emulateNetworkConditions",
-                {
-                    "offline": False,
-                    "latency": self.latency,
-                    "downloadThroughput": rate,
-                    "uploadThroughput": rate,
-                },
-            )
+        with throttled_page(self.mbit, self.latency, (500, 420)) as (page, _):
             began, found = time.monotonic(), []
             page.goto(link, wait_until="commit")
             for condition in conditions:
@@ -148,7 +134,6 @@ class SlowLine:
                         raise SystemExit(f"never came: {condition}")
                     time.sleep(0.02)
                 found.append(time.monotonic() - began)
-            browser.close()
         return found
 
 

@@ -20,6 +20,8 @@ from cagefield.edits.patch import SplatPatch
 from cagefield.fields.sh import C0
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
+from cagefield.rendering.splats import splitting
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from solid_fields import db, solid_field
 from splat_rooms import LIGHT, REACH, STRENGTH
@@ -209,3 +211,26 @@ def test_splats_under_what_is_lifted_get_lighter():
     away = np.linalg.norm(np.maximum(np.abs(field.means[:, :2] - [0.1, 0.0]) - 0.25, 0.0), axis=1)
     under, far = on_floor & (away == 0.0), on_floor & (away > 1.3 * REACH)
     assert log[under].mean() > 0.15 and np.abs(log[far]).max() < 0.05
+
+
+def test_light_that_arrives_leaves_the_splits_of_geometry(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The result is the same where both come at once; splats on an edge of the shadow are split by it too."""
+    field = splat_room(True)
+    on_floor = np.abs(field.means[:, 2]) < 0.01
+    wide = field.log_scales + np.where(on_floor, 1.5, 1.0)[:, None].astype(np.float32)
+    field = dataclasses.replace(field, log_scales=wide)
+    inner, outer = Cage.box((0.1, 0.0, 0.3), (0.62, 0.62, 0.66)), Cage.box((0.1, 0.0, 0.7), (1.3, 1.3, 1.5))
+    edit = Edit.continuous(inner, outer).rotate((0.0, 0.6, 0.0)).translate((0.0, 0.0, 0.3))
+    light = relight_splats(field, EditStack(), edit.replace(fill="none"), LIGHT)
+    assert light.is_light_alone
+    bare, lit = PreparedStack((PreparedEdit(edit),)), PreparedStack((PreparedEdit(edit, light=light),))
+    at_once = splitting.split_of(dataclasses.replace(field), lit)
+    splats = SplatSet.from_field(field)
+    geometry = splitting.split_of(splats, bare)
+    assert geometry is not None and at_once is not None
+    monkeypatch.setattr(splitting, "bent_children", lambda *args: pytest.fail("geometry is split again"))
+    later = splitting.split_of(splats, lit)
+    assert later is not None and later.parents[geometry.parents].all()
+    assert np.count_nonzero(later.parents) > np.count_nonzero(geometry.parents)
+    np.testing.assert_array_equal(later.parents, at_once.parents)
+    np.testing.assert_array_equal(later.children.field.means, at_once.children.field.means)

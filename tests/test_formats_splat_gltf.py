@@ -1,4 +1,4 @@
-"""What a .glb of splats says beside its splats: color spaces, a node's rotation, whole numbers."""
+"""Properties of a .glb beside its splats: color spaces, a node's rotation, whole numbers."""
 
 from __future__ import annotations
 
