@@ -5,6 +5,8 @@ import { joinBytePlanes, undoDifferences } from "../src/field/level";
 import type { Level, Vec3 } from "../src/field/level";
 import { AdaptiveResolution } from "../src/field/adaptive_resolution";
 import { memoryLimit, RenderLocation } from "../src/field/render_location";
+import { isBent } from "../src/field/edits_glsl";
+import { EDIT_LAYOUT } from "../src/field/layout";
 import { replacePart } from "../src/field/page_edits";
 import { buildLayerIndex, changedBricks, readLayer } from "../src/field/page_layers";
 import type { Layer } from "../src/field/page_layers";
@@ -378,4 +380,27 @@ it("a lost context, which knows no limits, is no reason to give up", () => {
     ({ getParameter: () => said }) as unknown as WebGL2RenderingContext;
   expect(deviceLimit(gl(null), 0)).toBeGreaterThan(4096);
   expect(deviceLimit(gl(2048), 0)).toBe(2048);
+});
+
+describe("cages that are no parallelepipeds", () => {
+  const { EDIT_ROWS, HEXAHEDRON, HEXAHEDRON_ROWS } = EDIT_LAYOUT;
+  /** Rows of one edit: its numbers in w, and which of its two hexahedra are affine. */
+  function rows(simple: number, first: number, last: number, affine: [number, number]): Float32Array {
+    const out = new Float32Array(4 * EDIT_ROWS);
+    out[4 * EDIT_LAYOUT.SIMPLE_SCALAR + 3] = simple;
+    out[4 * EDIT_LAYOUT.FIRST_SCALAR + 3] = first;
+    out[4 * EDIT_LAYOUT.LAST_SCALAR + 3] = last;
+    affine.forEach((value, n) => (out[4 * (HEXAHEDRON + n * HEXAHEDRON_ROWS) + 3] = value));
+    return out;
+  }
+  it("count only where samples go through them", () => {
+    expect(isBent(rows(0, 0, 2, [1, 1]), 1)).toBe(false);
+    expect(isBent(rows(0, 0, 2, [0, 1]), 1)).toBe(true);
+    expect(isBent(rows(0, 0, 2, [1, 0]), 1)).toBe(true);
+    expect(isBent(rows(0, 1, 2, [0, 1]), 1)).toBe(false); // no inner cage, as with a lattice cage
+    expect(isBent(rows(0, 0, 1, [1, 0]), 1)).toBe(false); // no region: a copy
+    expect(isBent(rows(1, 0, 2, [1, 0]), 1)).toBe(false);
+    const second = new Float32Array([...rows(1, 0, 2, [1, 1]), ...rows(0, 0, 2, [0, 1])]);
+    expect(isBent(second, 2)).toBe(true);
+  });
 });

@@ -21,6 +21,7 @@ bool inBox(vec3 p, vec3 low, vec3 high) { return all(greaterThanEqual(p, low)) &
 
 vec3 times(int at, vec3 v) { return vec3(dot(rows[at].xyz, v), dot(rows[at + 1].xyz, v), dot(rows[at + 2].xyz, v)); }
 
+#ifdef BENT
 vec3 solveColumns(vec3 u, vec3 v, vec3 w, vec3 r) {
   vec3 vw = cross(v, w);
   float det = dot(u, vw);
@@ -45,12 +46,14 @@ vec3 bent(int at, vec3 xi) {
   return xi + xi.x * xi.y * rows[at].xyz + xi.x * xi.z * rows[at + 1].xyz + xi.y * xi.z * rows[at + 2].xyz
     + xi.x * xi.y * xi.z * rows[at + 3].xyz;
 }
+#endif
 
 // Coordinates in the hexahedron at a row, clamped to [-1,1]^3, and the distance by which they were outside.
 vec3 hexahedron(vec3 p, int at, out float error) {
   vec3 y = times(at + MATRIX_VECTOR, p - rows[at + CENTER_VECTOR].xyz);
   vec3 xi = y;
   error = 0.0;
+#ifdef BENT
   if (rows[at + AFFINE_SCALAR].w < 0.5) {
     if (inBox(y, rows[at + Y_BOX_VECTOR].xyz, rows[at + Y_BOX_VECTOR + 1].xyz)) {
       xi = clamp(y, -1.0, 1.0);
@@ -66,6 +69,7 @@ vec3 hexahedron(vec3 p, int at, out float error) {
       error = 10.0;
     }
   }
+#endif
   error += max(largest(abs(xi)) - 1.0, 0.0);
   return clamp(xi, -1.0, 1.0);
 }
@@ -78,6 +82,7 @@ void image(vec3 xi, int at, inout vec3 p, inout vec3 v) {
   vec3 c2 = rows[c + 2].xyz;
   vec3 c4 = rows[c + 4].xyz;
   p = rows[c].xyz + xi.x * c1 + xi.y * c2 + xi.z * c4;
+#ifdef BENT
   if (rows[at + AFFINE_SCALAR].w < 0.5) {
     along = bendSolve(at + BEND_VECTOR, xi, along);
     vec3 c3 = rows[c + 3].xyz;
@@ -89,6 +94,7 @@ void image(vec3 xi, int at, inout vec3 p, inout vec3 v) {
     c2 += xi.x * c3 + xi.z * c6 + xi.x * xi.z * c7;
     c4 += xi.x * c5 + xi.y * c6 + xi.x * xi.y * c7;
   }
+#endif
   v = along.x * c1 + along.y * c2 + along.z * c4;
 }
 
@@ -255,6 +261,19 @@ export function unrolledEdits(edits: number): number | null {
 export function isGraded(rows: Float32Array, edits: number): boolean {
   const at = EDIT_LAYOUT.GRADE_SCALARS + EDIT_LAYOUT.GRADE_DENSITY;
   for (let e = 0; e < edits; e++) if (rows[4 * (e * EDIT_LAYOUT.EDIT_ROWS + at) + 3] > 0.5) return true;
+  return false;
+}
+
+/** Whether samples go through a cage that is no parallelepiped: the shader has Newton's iteration only then. */
+export function isBent(rows: Float32Array, edits: number): boolean {
+  const { EDIT_ROWS, HEXAHEDRON, HEXAHEDRON_ROWS, AFFINE_SCALAR } = EDIT_LAYOUT;
+  const scalar = (row: number): number => rows[4 * row + 3] ?? 0;
+  for (let e = 0; e < edits * EDIT_ROWS; e += EDIT_ROWS) {
+    if (scalar(e + EDIT_LAYOUT.SIMPLE_SCALAR) > 0.5) continue;
+    const affine = [0, HEXAHEDRON_ROWS].map((at) => scalar(e + HEXAHEDRON + at + AFFINE_SCALAR) > 0.5);
+    if (scalar(e + EDIT_LAYOUT.FIRST_SCALAR) < 0.5 && !affine[0]) return true;
+    if (scalar(e + EDIT_LAYOUT.LAST_SCALAR) > 1.5 && !affine[1]) return true;
+  }
   return false;
 }
 

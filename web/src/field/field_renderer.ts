@@ -10,7 +10,7 @@
  *
  * Drawing changes the state of the context: three.js needs `resetState()` afterwards.
  */
-import { isGraded, unrolledEdits } from "./edits_glsl";
+import { isBent, isGraded, unrolledEdits } from "./edits_glsl";
 import { EditTextures } from "./edits_on_gpu";
 import { OutOfMemory, createProgram } from "./gl";
 import type { Program } from "./gl";
@@ -150,6 +150,7 @@ export class FieldRenderer implements SceneDrawer<PageEdits> {
       edits: active && unrolledEdits(active.edits),
       normals: options.normals ?? false,
       graded: active !== null && isGraded(active.rows, active.edits),
+      bent: active !== null && isBent(active.rows, active.edits),
       count: options.count ?? false,
     };
     const { program, uniform } = this.program(variant, level.field.brick);

@@ -17,6 +17,8 @@ export interface MarchVariant {
   normals: boolean;
   /** Whether edits grade colors. */
   graded: boolean;
+  /** Whether a cage of the edits is no parallelepiped. */
+  bent: boolean;
   /** Writes counts in place of depth: 65536 * (texture reads / 4) + samples. */
   count?: boolean;
 }
@@ -292,6 +294,7 @@ export function marchShader(variant: MarchVariant, brick: number): string {
   if (variant.contracted) defines.push("#define CONTRACTED");
   if (variant.edited) defines.push("#define EDITED");
   if (variant.edited && variant.graded) defines.push("#define GRADED");
+  if (variant.edited && variant.bent) defines.push("#define BENT");
   if (variant.normals) defines.push("#define NORMALS");
   if (variant.count) defines.push("#define COUNT");
   return [
