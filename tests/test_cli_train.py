@@ -18,6 +18,8 @@ from scenes import ball_scene, files_of
 
 QUICK = ("--steps", "60", "--resolution", "48")
 TRAIN_QUICK = (*QUICK, "--sh-degree", "1")
+SHORT = ("--steps", "5", "--resolution", "16")
+"""Enough for what is said about a training."""
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +143,7 @@ def test_missing_photos_are_one_line_of_warning(
 ) -> None:
     shutil.copytree(photos, tmp_path / "photos")
     (tmp_path / "photos" / "train" / "r_3.png").unlink()
-    assert main(["train", str(tmp_path / "photos"), "-o", str(tmp_path / "scene"), *TRAIN_QUICK]) == 0
+    assert main(["train", str(tmp_path / "photos"), "-o", str(tmp_path / "scene"), *SHORT]) == 0
     warned = [line for line in capsys.readouterr().err.splitlines() if "warning" in line]
     assert len(warned) == 1 and warned[0].startswith("cagefield: warning: ") and "r_3" in warned[0]
     assert len(Scene.open(tmp_path / "scene").cameras["train"]) == 7
@@ -150,8 +152,8 @@ def test_missing_photos_are_one_line_of_warning(
 def test_auto_takes_voxels_for_a_bounded_scene_and_says_so(
     photos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["train", str(photos), "-o", str(tmp_path / "scene"), *TRAIN_QUICK]) == 0
+    assert main(["train", str(photos), "-o", str(tmp_path / "scene"), *SHORT]) == 0
     err = capsys.readouterr().err
     assert err.startswith("Training voxels, the scene is bounded (--field splat trains splats)\n")
-    assert main(["train", str(photos), "-o", str(tmp_path / "told"), *TRAIN_QUICK, "--field", "voxel"]) == 0
+    assert main(["train", str(photos), "-o", str(tmp_path / "told"), *SHORT, "--field", "voxel"]) == 0
     assert "the scene is bounded" not in capsys.readouterr().err

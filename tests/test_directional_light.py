@@ -52,7 +52,7 @@ def room(at: tuple[float, float] | None, *, sun: float = SHARE, resolution: int 
 
 def cameras() -> tuple[Camera, ...]:
     """Around the floor, from above."""
-    return turntable((0.0, 0.0, -0.3), 3.0, 8, elevation=0.8, width=72, height=72, fov_x=0.6)
+    return turntable((0.0, 0.0, -0.3), 3.0, 6, elevation=0.8, width=52, height=52, fov_x=0.6)
 
 
 def scene(field: VoxelField) -> Scene:

@@ -119,7 +119,7 @@ def test_an_exported_page_marks_them_and_tours(tmp_path: Path) -> None:
     scene, hotspots = page_of_ball()
     file = tmp_path / "scene.html"
     file.write_text(ScenePage.build(scene, HOSTILE).one_file(), encoding="utf-8")
-    with shown(file) as page:
+    with shown(file, size=120) as page:
         assert page.evaluate("window.taken === undefined && document.images.length === 0")
         until(page, "document.querySelectorAll('.hotspots button')[1].hidden")
         assert hidden(page) == [False, True, False]

@@ -23,9 +23,9 @@ from splat_scenes import splat_scene
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 
 
-SIDES = 500, 300
+SIDES = 360, 220
 """Width and height of the window."""
-HOLD = (120.0, 220.0)
+HOLD = (100.0, 160.0)
 """Where the view is taken hold of."""
 
 
