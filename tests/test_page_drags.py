@@ -132,6 +132,7 @@ def test_views_are_the_servers(pair: tuple[EditorPage, EditorPage], scene: Path,
             page.page.click("[data-view=color]")
 
 
+@pytest.mark.nightly
 def test_a_page_that_reconnects_keeps_the_field(pair: tuple[EditorPage, EditorPage]) -> None:
     own, _ = pair
     own.page.bring_to_front()
