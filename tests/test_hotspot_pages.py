@@ -40,7 +40,7 @@ def test_the_editor_places_changes_and_undoes_hotspots(tmp_path: Path) -> None:
     camera = camera_at((0.0, -3.0, 0.0))
     cameras = {"test": (camera, camera_at((0.0, 3.0, 0.0)))}
     Scene(ball_field(radius=RADIUS), cameras=cameras).save(tmp_path / "ball")
-    with editor_server(tmp_path / "ball") as server, editor_page(server.link) as editor:
+    with editor_server(tmp_path / "ball") as server, editor_page(server.link, 520, 380) as editor:
         page = editor.page
         editor.ready()
         editor.press("Shift+H")
