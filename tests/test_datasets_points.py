@@ -256,6 +256,7 @@ def test_without_pycolmap_the_warning_names_the_cure(data, monkeypatch):
     assert len(caught) == 1
 
 
+@pytest.mark.nightly
 def test_progress_grows_to_one_and_nothing_is_printed(data, capfd):
     shares = []
     triangulate(data.train[:4], on_progress=lambda done, note: shares.append(done))

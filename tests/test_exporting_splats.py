@@ -51,6 +51,7 @@ def splats_scene(*edits: Edit, count: int = 2000, smaller: float = 2.3) -> Scene
     )
 
 
+@pytest.mark.nightly
 def test_the_page_shows_the_edited_splats_and_those_before(tmp_path: Path) -> None:
     scene = dataclasses.replace(splats_scene(TURN, MOVE), preserve_opacity=False)
     camera = scene.cameras["test"][0]
