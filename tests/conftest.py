@@ -88,6 +88,12 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+def pytest_sessionfinish() -> None:
+    """Gives them back: else Quadrants' runtime is never freed, and the kernels that this process compiled are
+    not written to the disk."""
+    gc.unfreeze()
+
+
 @pytest.fixture(scope="session")
 def trained_digger(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The scene folder of a digger, trained for seconds on 20 small photos; to be copied."""

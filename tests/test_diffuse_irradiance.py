@@ -24,7 +24,7 @@ MIDDLE = np.array([0.0, 0.0, FLOOR + RADIUS])
 TOWARDS = np.array([0.45, -0.2, 0.2])
 
 
-def balls(towards: NDArray[np.float64], resolution: int = 52) -> VoxelField:
+def balls(towards: NDArray[np.float64], resolution: int = 64) -> VoxelField:
     """A gray ball on a floor, lit by 1 + towards . n, without shadows."""
     axis = np.linspace(-1.0, 1.0, resolution)
     at = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
@@ -41,7 +41,7 @@ def balls(towards: NDArray[np.float64], resolution: int = 52) -> VoxelField:
 
 def cameras() -> tuple[Camera, ...]:
     """Around the floor, from above."""
-    return turntable((0.0, 0.0, -0.2), 3.0, 6, elevation=0.5, width=64, height=64, fov_x=0.5)
+    return turntable((0.0, 0.0, -0.2), 3.0, 6, elevation=0.5, width=96, height=96, fov_x=0.5)
 
 
 @pytest.fixture(scope="module")
