@@ -37,7 +37,7 @@ def room(tmp_path_factory):
 @pytest.fixture(scope="module")
 def short_room(tmp_path_factory):
     """Seven photos to train with, and two to test."""
-    return make_capture("room-digger", tmp_path_factory.mktemp("captures") / "room", views=9, size=112)
+    return make_capture("room-digger", tmp_path_factory.mktemp("captures") / "room", views=9, size=160)
 
 
 @cache

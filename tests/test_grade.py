@@ -123,7 +123,7 @@ def test_the_kernels_grade_is_the_references(name: str) -> None:
 @pytest.mark.parametrize("name", nightly_except(STACKS, "turned, lattice", "bent", "two"))
 def test_voxels_match_the_plain_renderer(name: str) -> None:
     field, stack = fog(), EditStack(STACKS[name])
-    fast = VoxelRenderer(field, stack, step=0.25).render(CAMERA, normals=True)
+    fast = VoxelRenderer(field, stack, step=0.25).render(CAMERA)
     plain = render_sampled(field, CAMERA, edits=stack, samples=200)
     neutral = EditStack(edit.replace(grading=Grade()) for edit in stack)
     ungraded = render_sampled(field, CAMERA, edits=neutral, samples=200)
@@ -136,9 +136,7 @@ def test_a_uniform_grade_is_the_matrix_on_the_picture() -> None:
     everything = Cage.box((0, 0, 0), 4.0)
     stack = EditStack([Edit.copy(everything, grading=Grade(hue_deg=40.0, saturation=0.6))])
     stacks = EditStack(), stack
-    before, after = (
-        VoxelRenderer(field, edits).render(CAMERA, background="none", normals=True) for edits in stacks
-    )
+    before, after = (VoxelRenderer(field, edits).render(CAMERA, background="none") for edits in stacks)
     visible = before.opacity > 0.05
     expected = before.rgb[visible] @ stack[0].grading.matrix.T
     assert np.abs(after.rgb[visible] - expected).max() < 5e-3

@@ -28,7 +28,7 @@ RED, GREY = Plain((0.8, 0.1, 0.1), 0.0), Plain((0.3, 0.3, 0.3), 0.0)
 @pytest.fixture(scope="module")
 def small(tmp_path_factory):
     """A capture of 16 small photos of the digger's room."""
-    return make_capture("room-digger", tmp_path_factory.mktemp("room") / "d", views=16, size=112, depth="all")
+    return make_capture("room-digger", tmp_path_factory.mktemp("room") / "d", views=16, size=160, depth="all")
 
 
 def board(mirror: float) -> Part:
