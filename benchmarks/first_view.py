@@ -27,7 +27,7 @@ from playwright.sync_api import sync_playwright
 
 import cagefield
 from benchmarks.common.machine import cpu_model
-from editor_page import CHROMIUM, FLAGS
+from chromium import CHROMIUM, FLAGS
 
 PATIENCE = 600.0
 TICK = os.sysconf("SC_CLK_TCK")

@@ -34,7 +34,8 @@ from benchmarks.common.machine import cpu_model
 from cagefield.fields.splat_field import SplatField
 from cagefield.pages.scene_page import ScenePage
 from cagefield.scene.scene import Scene
-from editor_page import CHROMIUM, FLAGS, asking
+from chromium import CHROMIUM, FLAGS
+from editor_page import asking
 from field_page import FieldPage, field_page
 from gpu_objects import COUNT
 from page_fields import lumps_scene

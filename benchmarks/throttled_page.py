@@ -8,7 +8,7 @@ from typing import Any
 
 from playwright.sync_api import Page, sync_playwright
 
-from editor_page import CHROMIUM, FLAGS
+from chromium import CHROMIUM, FLAGS
 
 
 @contextmanager

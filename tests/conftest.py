@@ -21,6 +21,7 @@ from cagefield import Scene, load_dataset
 from cagefield.procedural import make_scene
 from cagefield.training.voxels.train_voxels import train_voxel
 from cagefield.training.voxels.voxel_config import VoxelConfig
+from chromium import close_chromium
 from distribution import long_first, pytest_xdist_make_scheduler  # noqa: F401
 from own_cache import cache_of_its_own
 
@@ -58,6 +59,7 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if config.getoption("--page-renderer"):
         editor_page.DRAWN_BY = "page"
+    config.add_cleanup(close_chromium)
     config.option.loadscopereorder = False  # the order is that of `long_first`
 
 
@@ -84,6 +86,12 @@ def pytest_collection_finish() -> None:
     """Takes modules and tests, over half a million objects, out of Python's later searches for garbage."""
     gc.collect()
     gc.freeze()
+
+
+def pytest_sessionfinish() -> None:
+    """Gives them back: else Quadrants' runtime is never freed, and the kernels that this process compiled are
+    not written to the disk."""
+    gc.unfreeze()
 
 
 @pytest.fixture(scope="session")

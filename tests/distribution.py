@@ -15,6 +15,11 @@ import pytest
 FAMILIES: dict[str, tuple[str, ...]] = {
     "marches through edits": (
         "test_renderer",
+        "test_grade",
+        "test_field_page",
+        "test_page_layers",
+        "test_exporting_page",
+        "test_exporting_free_form",
         "test_completion",
         "test_diffuse_irradiance",
         "test_directional_light",
@@ -41,10 +46,8 @@ FAMILIES: dict[str, tuple[str, ...]] = {
 LONG: tuple[str, ...] = (
     "test_files",
     "test_page_renderer",
-    "test_page_layers",
     "test_editor_gestures",
     "test_page_drags",
-    "test_exporting_page",
     "test_pose_verification",
     "test_poses_stopped",
     "test_poses",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import shutil
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,21 +11,11 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-]
+from chromium import chromium_context
+
 PATIENCE = 120.0
 """Seconds until what does not come is given up: the first pictures wait for kernels to compile."""
 
@@ -217,25 +206,19 @@ def editor_page(
     link: str, width: int = 640, height: int = 460, *, touch: bool = False, usual: tuple[str, ...] = USUAL
 ) -> Iterator[EditorPage]:
     """A page of the editor; skips without Chromium. Errors and words on the console fail the test."""
-    sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    if CHROMIUM is None:
-        pytest.skip("no chromium on this machine")
     complaints: list[str] = []
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        context = browser.new_context(
-            viewport={"width": width, "height": height},
-            permissions=["clipboard-read", "clipboard-write"],
-            has_touch=touch,
-            is_mobile=touch,
-        )
+    with chromium_context(
+        viewport={"width": width, "height": height},
+        permissions=["clipboard-read", "clipboard-write"],
+        has_touch=touch,
+        is_mobile=touch,
+    ) as context:
         page = context.new_page()
         page.on("dialog", lambda dialog: dialog.accept())
         context.on("weberror", lambda error: complaints.append(str(error.error)))
         context.on("console", lambda said: complaints.append(said.text))
         page.goto(_asked(link))
         yield EditorPage(page)
-        browser.close()
     left = [said for said in complaints if not any(word in said for word in usual)]
     assert left == [], left
 

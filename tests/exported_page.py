@@ -14,29 +14,25 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
 from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack
 from cagefield.scene.scene import Scene
-from editor_page import CHROMIUM, FLAGS
+from chromium import chromium_context
 from gpu_objects import COUNT
 from page_fields import SIZE
 
 
 @contextmanager
-def shown(address: Path | str, touch: bool = False) -> Iterator[Any]:
+def shown(address: Path | str, touch: bool = False, size: int = SIZE) -> Iterator[Any]:
     """The page of a file, its first whole picture drawn, or of an address; it asks no other for anything."""
-    sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    if CHROMIUM is None:
-        pytest.skip("no chromium on this machine")
     complaints: list[str] = []
     asked: list[str] = []
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        page = browser.new_page(viewport={"width": SIZE, "height": SIZE}, has_touch=touch, is_mobile=touch)
+    viewport = {"width": size, "height": size}
+    with chromium_context(viewport=viewport, has_touch=touch, is_mobile=touch) as context:
+        page = context.new_page()
         page.add_init_script(f"({COUNT})()")
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("console", lambda said: complaints.append(said.text))
@@ -46,7 +42,6 @@ def shown(address: Path | str, touch: bool = False) -> Iterator[Any]:
         if isinstance(address, Path):
             settle(page)
         yield page
-        browser.close()
     assert complaints == [], complaints
     own = (url.rsplit("/", 1)[0], "data:", "blob:")
     assert [other for other in asked if not other.startswith(own)] == [], asked

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
 import cagefield
 from cagefield.cameras.camera import Camera
-from editor_page import CHROMIUM, FLAGS, USUAL
+from chromium import chromium_context
+from editor_page import USUAL
 
 VIEWER = Path(cagefield.__file__).parent / "pages" / "viewer" / "viewer.js"
 
@@ -116,17 +116,11 @@ class FieldPage:
 def field_page(splats: bool = False, flags: Sequence[str] | None = None) -> Iterator[FieldPage]:
     """A bare page with a renderer; skips where there is no Chromium. The page's errors fail the test.
 
-    flags: command line of Chromium; by default it draws in software.
+    flags: command line of a Chromium for this page alone; by default the process's, which draws in software.
     """
-    sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    if CHROMIUM is None:
-        pytest.skip("no chromium on this machine")
     complaints: list[str] = []
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=CHROMIUM, args=list(FLAGS if flags is None else flags)
-        )
-        page = browser.new_page(viewport={"width": 200, "height": 150})
+    with chromium_context(flags, viewport={"width": 200, "height": 150}) as context:
+        page = context.new_page()
         page.set_default_timeout(300_000)
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("console", lambda said: complaints.append(said.text))
@@ -134,7 +128,6 @@ def field_page(splats: bool = False, flags: Sequence[str] | None = None) -> Iter
         page.add_script_tag(content=VIEWER.read_text())
         page.evaluate(_START, "SplatRenderer" if splats else "FieldRenderer")
         yield FieldPage(page, splats)
-        browser.close()
     left = [said for said in complaints if not any(word in said for word in USUAL)]
     assert left == [], left
 

@@ -11,8 +11,8 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.scene.scene import Scene
 
-SIZE = 120
-"""Of the scene's pictures."""
+SIZE = 64
+"""Pixels of a side of the scene's pictures: Chromium draws them in software, at a cost per pixel."""
 
 MOVE = Edit.move(Cage.box((0.6, 0.5, 0.3), (1.0, 0.9, 0.9))).translate((0.0, -0.5, 0.8))
 

@@ -106,6 +106,7 @@ _KILLED = textwrap.dedent("""
 """)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("way", ["exchange", "renames"])
 def test_an_edit_that_is_killed_leaves_a_scene_at_its_place(tmp_path: Path, way: str) -> None:
     """Killed at every call that changes a folder: the old scene or the new one, and the user's own files."""

@@ -48,6 +48,7 @@ def test_blocks_of_a_street_hold_parts_of_it(capture: Path) -> None:
     assert np.linalg.norm(middles[1] - middles[0]) > 0.2 * 12.0  # a fifth of the street's length
 
 
+@pytest.mark.nightly
 @pytest.mark.train
 def test_the_command_trains_and_resumes_blocks(
     capture: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

@@ -198,9 +198,11 @@ def test_photos_that_are_in_no_split_are_counted(short_room, tmp_path):
 def test_figures_leave_out_what_a_mask_excludes(short_room, tmp_path):
     """A square of each test photo is painted black and masked: figures are those of the other pixels."""
     data = load_dataset(short_room)
+    data = dataclasses.replace(data, train=data.train[:2])
     tests = []
     for view in data.test:
-        photo, mask = view.load(), np.full((160, 90), 255, np.uint8)
+        photo = view.load()
+        mask = np.full(photo.shape[:2], 255, np.uint8)
         photo[40:80, 20:60], mask[40:80, 20:60] = 0, 0
         paths = tmp_path / f"{Path(view.name).stem}.png", tmp_path / f"{Path(view.name).stem}_mask.png"
         Image.fromarray(photo).save(paths[0])
@@ -211,7 +213,7 @@ def test_figures_leave_out_what_a_mask_excludes(short_room, tmp_path):
     plain, masked, black = (captures.measure(d, exact()).test for d in (data, painted, unmasked))
     assert black.psnr < plain.psnr - 5
     assert masked.psnr == pytest.approx(plain.psnr, abs=1.5) and masked.ssim > plain.ssim - 0.02
-    nothing = np.zeros((160, 90), np.uint8)
+    nothing = np.zeros_like(mask)
     Image.fromarray(nothing).save(tmp_path / "none.png")
     hidden = dataclasses.replace(tests[0], mask=PhotoMask(tmp_path / "none.png"))
     with pytest.warns(UserWarning, match="1 of 2 photos are left out of the figures"):

@@ -353,7 +353,7 @@ def test_make_scene_refuses_unknown_names_and_other_folders(
 
 def test_make_scene_writes_captures_of_rooms(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     out = tmp_path / "photos"
-    argv = ["make-scene", "room-chair", "-o", out, "--views", 9, "--size", 64]
+    argv = ["make-scene", "room-chair", "-o", out, "--views", 9, "--size", 32]
     assert "photos of room-chair (parts: seat, " in printed(capsys, *argv, "--no-points")
     data = cagefield.load_dataset(out)
     assert (len(data.train), len(data.test)) == (7, 2) and data.unbounded and data.points is None

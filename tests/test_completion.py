@@ -70,7 +70,7 @@ def cage(scale: float = 1.0) -> Cage:
 
 def cameras(scale: float = 1.0) -> tuple[Camera, ...]:
     """Around the floor, from above."""
-    return turntable((0.0, 0.0, -0.3 * scale), 3.0 * scale, 8, elevation=0.7, width=72, height=72, fov_x=0.6)
+    return turntable((0.0, 0.0, -0.3 * scale), 3.0 * scale, 8, elevation=0.7, width=54, height=54, fov_x=0.6)
 
 
 def seen(scene: Scene) -> NDArray[np.float32]:

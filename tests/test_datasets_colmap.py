@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from cagefield.datasets.colmap.colmap_files import check_complete
 from cagefield.datasets.nerf_normalization import normalize_to_unit_cube
 from cagefield.errors import DatasetError
 from posed_photos import HEIGHT, POINT, WIDTH, assert_spot_is_where_the_camera_says, project, ring, save, spot
+from tiers import nightly_except
 
 pycolmap = pytest.importorskip("pycolmap", reason="COLMAP models are read by pycolmap")
 
@@ -217,8 +219,13 @@ def rigs(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("name", ["cameras.bin", "images.bin", "points3D.bin", "rigs.bin", "frames.bin"])
-@pytest.mark.parametrize("part", [1 << 20, 64, 5])
+COLMAP_FILES = ("cameras.bin", "images.bin", "points3D.bin", "rigs.bin", "frames.bin")
+
+
+@pytest.mark.parametrize(
+    ("name", "part"),
+    nightly_except(product(COLMAP_FILES, [1 << 20, 64, 5]), *product(COLMAP_FILES, [64])),
+)
 def test_binary_files_cut_off_anywhere_are_noticed(rigs, tmp_path, monkeypatch, name, part):
     """However much of them is held at a time, at least one byte; what is asked for is read anew."""
     monkeypatch.setattr(colmap_files, "_WINDOW_BYTES", part)

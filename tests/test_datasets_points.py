@@ -89,6 +89,7 @@ def test_fisheyes_and_cut_outs(tmp_path, lens, cut_out):
     assert np.median(distances) < 0.012 and np.quantile(distances, 0.9) < 0.06
 
 
+@pytest.mark.nightly
 def test_another_world_gives_the_same_points_there(data, points):
     rigid = np.eye(4)
     rigid[:3, :3] = Camera.look_at((1, 2, 3), (0, 0, 0), width=2, height=2, fov_x=1.0).c2w[:3, :3]
@@ -100,6 +101,7 @@ def test_another_world_gives_the_same_points_there(data, points):
     assert np.median(distance_to_textures(back)) < 0.01
 
 
+@pytest.mark.nightly
 def test_points_made_again_are_the_same(data, points):
     np.testing.assert_allclose(starting_points(data).positions, points.positions, atol=1e-6)
 
@@ -254,6 +256,7 @@ def test_without_pycolmap_the_warning_names_the_cure(data, monkeypatch):
     assert len(caught) == 1
 
 
+@pytest.mark.nightly
 def test_progress_grows_to_one_and_nothing_is_printed(data, capfd):
     shares = []
     triangulate(data.train[:4], on_progress=lambda done, note: shares.append(done))

@@ -17,6 +17,7 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.scene.scene import Scene
 from solid_fields import db, solid_field
+from tiers import nightly_after_first
 
 FLOOR, RADIUS = -0.4, 0.3
 MIDDLE = np.array([0.0, 0.0, FLOOR + RADIUS])
@@ -63,7 +64,7 @@ def turned(relight: str, adjustment: str) -> EditStack:
     return EditStack([Edit.move(cage, relight=relight, fill="none").rotate((0.0, 0.0, 80.0))])
 
 
-@pytest.mark.parametrize("adjustment", ["discrete", "continuous"])
+@pytest.mark.parametrize("adjustment", nightly_after_first(["discrete", "continuous"]))
 def test_a_turned_ball_looks_as_it_did(lit: Scene, adjustment: str) -> None:
     before = seen(lit)
     kept, relit = (db(seen(lit.with_edits(turned(way, adjustment))), before) for way in ("none", "occlusion"))

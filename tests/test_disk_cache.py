@@ -102,6 +102,7 @@ def test_the_next_process_has_the_same_patches_without_a_picture(folder: Path) -
         np.testing.assert_array_equal(left, right)
 
 
+@pytest.mark.nightly
 def test_a_drag_after_opening_is_as_one_before(folder: Path) -> None:
     """Whoever knows the light knows what cameras see: a drag is made with both, or with neither."""
     further = [MOVE.translate([0.0, 0.1, 0.0])]

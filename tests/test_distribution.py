@@ -39,6 +39,7 @@ def test_processes_of_tests_keep_bytecode() -> None:
     assert subprocess.run(command, capture_output=True, text=True).stdout.split() == ["False"]
 
 
+@pytest.mark.nightly
 def test_files_of_a_family_run_in_one_process(tmp_path: Path) -> None:
     """As many tests as let both processes take files, each of which notes its process."""
     pytest.importorskip("xdist", reason="pytest-xdist is not installed")

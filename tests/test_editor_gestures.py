@@ -79,7 +79,7 @@ def server(folder: Path) -> Iterator[EditorServer]:
 
 @pytest.fixture(scope="module")
 def opened(server: EditorServer) -> Iterator[EditorPage]:
-    with editor_page(server.link, 760, 520) as page:
+    with editor_page(server.link, 640, 440) as page:
         page.ready()
         yield page
 
@@ -414,7 +414,7 @@ def test_views_split_and_before(editor: EditorPage) -> None:
     editor.page.keyboard.up("b")
     editor.until("!cagefield.picture.before && cagefield.settled")
     before = editor.page.evaluate("cagefield.camera.c2w")
-    with editor.held((80, 440), (60, 0)):
+    with editor.held((80, 370), (60, 0)):
         pass
     editor.settle()
     assert not np.allclose(editor.page.evaluate("cagefield.camera.c2w"), before)
@@ -428,7 +428,7 @@ def test_views_split_and_before(editor: EditorPage) -> None:
 
 def test_a_camera_path_is_recorded_and_played(editor: EditorPage) -> None:
     editor.changed(lambda: editor.press("k"))
-    with editor.held((80, 440), (60, 0)):
+    with editor.held((80, 370), (60, 0)):
         pass
     editor.settle()
     editor.changed(lambda: editor.page.click(".add-key"))

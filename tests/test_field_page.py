@@ -28,6 +28,7 @@ from cagefield.pages.page_file import unpack
 from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from field_page import Drawn, FieldPage, field_page
 from page_fields import lumps
+from tiers import nightly_except
 
 LEAST = 40.0
 """dB between the page's and the kernel's pictures: 8 bits alone are 59, and their two roundings 55."""
@@ -204,7 +205,11 @@ STACKS = {
 }
 
 
-@pytest.mark.parametrize("name", STACKS)
+EVERY_RUN = ("bent outer cage", "trilinear shell", "stack", "graded stack", "mirrored, bent")
+"""Every kind of edit, of cage and of shell, grades and mirrors."""
+
+
+@pytest.mark.parametrize("name", nightly_except(STACKS, *EVERY_RUN))
 def test_the_page_draws_edits_as_the_kernel_does(page: FieldPage, name: str) -> None:
     check_edits(page, lumps(1, False), EditStack(STACKS[name]))
 

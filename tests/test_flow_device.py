@@ -17,6 +17,7 @@ from cagefield.typing import Array
 from cagefield.warps.continuous import ContinuousWarp
 from flow_edits import EDITS, INNER, OUTER, flow_edits, shell_of, shell_points
 from random_cages import examples, unit_vectors
+from tiers import nightly_after_first
 
 EPS = float(np.finfo(np.float32).eps)
 
@@ -67,7 +68,7 @@ def test_random_edits_against_the_reference(edit: Edit) -> None:
     compare([edit], 100)
 
 
-@pytest.mark.parametrize("name", ["turn of 90", "bent cages", "linear, half"])
+@pytest.mark.parametrize("name", nightly_after_first(["turn of 90", "bent cages", "linear, half"]))
 def test_lattice_error_falls_with_its_order(name: str) -> None:
     from cagefield.edits.device_stack import DeviceStack
 
@@ -152,6 +153,7 @@ def test_lattice_error_of_an_edit() -> None:
     assert edit.lattice_error() == (0.0, 0.0)
 
 
+@pytest.mark.nightly
 def test_promises_over_random_edits() -> None:
     # Two edits in float64, which needs a process of its own; the benchmark takes ten thousand.
     script = Path(__file__).parents[1] / "benchmarks" / "flow_random.py"

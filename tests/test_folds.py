@@ -148,6 +148,7 @@ def test_training_finds_folded_poses_anew_and_holds_out_the_same_photos(
     assert poses_command.verified(right).dataset is right and len(solver.calls) == 1
 
 
+@pytest.mark.nightly
 def test_a_fold_that_structure_from_motion_finds_too_is_kept_and_said(photos, tmp_path, monkeypatch, capsys):
     wrong = dataset(tmp_path / "wrong", folded(), photos)
     monkeypatch.setattr("cagefield.datasets.sfm.pose_verification.PoseSolver", _Solver(wrong))

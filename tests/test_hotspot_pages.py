@@ -40,7 +40,7 @@ def test_the_editor_places_changes_and_undoes_hotspots(tmp_path: Path) -> None:
     camera = camera_at((0.0, -3.0, 0.0))
     cameras = {"test": (camera, camera_at((0.0, 3.0, 0.0)))}
     Scene(ball_field(radius=RADIUS), cameras=cameras).save(tmp_path / "ball")
-    with editor_server(tmp_path / "ball") as server, editor_page(server.link) as editor:
+    with editor_server(tmp_path / "ball") as server, editor_page(server.link, 520, 380) as editor:
         page = editor.page
         editor.ready()
         editor.press("Shift+H")
@@ -119,7 +119,7 @@ def test_an_exported_page_marks_them_and_tours(tmp_path: Path) -> None:
     scene, hotspots = page_of_ball()
     file = tmp_path / "scene.html"
     file.write_text(ScenePage.build(scene, HOSTILE).one_file(), encoding="utf-8")
-    with shown(file) as page:
+    with shown(file, size=120) as page:
         assert page.evaluate("window.taken === undefined && document.images.length === 0")
         until(page, "document.querySelectorAll('.hotspots button')[1].hidden")
         assert hidden(page) == [False, True, False]

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import textwrap
 import threading
 import time
 import warnings
@@ -86,6 +87,26 @@ def test_a_second_process_loads_its_kernels_from_the_disk(tmp_path: Path) -> Non
     again, stored, loaded = run(tmp_path)
     assert (stored, loaded) == (False, True)
     assert again == point
+
+
+@pytest.mark.nightly
+def test_processes_of_tests_write_their_kernels(tmp_path: Path) -> None:
+    """Objects that `conftest.py` freezes after the collection would keep Quadrants' runtime alive."""
+    conftest = Path(__file__).with_name("conftest.py")
+    (tmp_path / "conftest.py").write_text(
+        "import importlib.util, sys\n"
+        f"sys.path.insert(0, {str(conftest.parent)!r})\n"
+        f"spec = importlib.util.spec_from_file_location('suite', {str(conftest)!r})\n"
+        "suite = importlib.util.module_from_spec(spec)\n"
+        "spec.loader.exec_module(suite)\n"
+        "pytest_collection_finish = suite.pytest_collection_finish\n"
+        "pytest_sessionfinish = suite.pytest_sessionfinish\n"
+    )
+    (tmp_path / "test_map.py").write_text(
+        f"from cagefield.edits import device_stack\n\ndef test():\n{textwrap.indent(MAP, '    ')}"
+    )
+    process(tmp_path / "cache", "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path))
+    assert list((tmp_path / "cache").rglob("*.qdc"))
 
 
 @pytest.mark.nightly

@@ -173,16 +173,16 @@ def test_flow_backwards_undoes_it() -> None:
 
 
 def test_nodes_are_the_exact_map_to_less_than_their_interpolation() -> None:
-    edit = EDITS["bend 90"]
+    edit = EDITS["bend 90"].replace(lattice=48)
     nodes, exact = edit.lattice_nodes, edit.exact_warp
-    assert nodes.shape == (64**3, 3)
+    assert nodes.shape == (48**3, 3)
     rng = np.random.default_rng(7)
-    at = rng.integers(64, size=(500, 3))
+    at = rng.integers(48, size=(500, 3))
     origin, frame = edit.outer.frame
-    x = origin + (at / 63.0) @ frame.T
-    moved = nodes[at[:, 0] + 64 * (at[:, 1] + 64 * at[:, 2])]
+    x = origin + (at / 47.0) @ frame.T
+    moved = nodes[at[:, 0] + 48 * (at[:, 1] + 48 * at[:, 2])]
     error = np.linalg.norm(exact.to_canonical(x).points - x - moved, axis=1)
-    worst, mean = edit.lattice_error(64, samples=500)
+    worst, mean = edit.lattice_error(48, samples=500)
     assert error.mean() < 0.3 * mean and error.max() < 0.3 * worst
     bent = EDITS["bent outer cage"].replace(lattice=16)
     x = bent.outer.frame[0] + bspline_lattice.grid((16, 16, 16)) @ bent.outer.frame[1].T

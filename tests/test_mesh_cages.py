@@ -16,6 +16,7 @@ from cagefield.typing import Array
 from cagefield.warps import MeshShell
 from cagefield.warps.lattice_flow import slope_bound
 from cagefield.warps.mesh_flow import MeshPiece, blend
+from tiers import nightly_except
 
 BOX = Cage.box((0, 0, 0), 0.8)
 CUBE = MeshCage.of_box(BOX)
@@ -193,7 +194,7 @@ def check(edit: Continuous, seed: int, samples: int) -> None:
         assert max(steepest) < 2.0
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", nightly_except(range(20), 0, 5, 7, 13))
 def test_random_edits_do_not_fold(seed: int) -> None:
     check(random_mesh_edit(seed), seed, 300)
 

@@ -15,6 +15,7 @@ from editor_page import PATIENCE, EditorPage, asking, editor_page
 from editor_server import EditorServer, editor_server
 from page_shots import HALF, alike
 from scenes import ball_cameras, ball_field
+from tiers import nightly_except
 
 MANY = "version: 1\nedits:\n" + "".join(
     f"  - {{delete: true, inner: {{center: [{3 + n}.0, 0.0, 0.0], size: [0.5, 0.5, 0.5]}}}}\n"
@@ -114,7 +115,7 @@ def test_a_drag_is_drawn_by_the_page_and_ends_as_the_server_draws_it(
     assert own.page.evaluate("cagefield.page.loads") == 1
 
 
-@pytest.mark.parametrize("view", ["normals", "depth", "opacity", "split"])
+@pytest.mark.parametrize("view", nightly_except(["normals", "depth", "opacity", "split"], "depth", "split"))
 def test_views_are_the_servers(pair: tuple[EditorPage, EditorPage], scene: Path, view: str) -> None:
     for page in pair:
         page.page.bring_to_front()
@@ -131,6 +132,7 @@ def test_views_are_the_servers(pair: tuple[EditorPage, EditorPage], scene: Path,
             page.page.click("[data-view=color]")
 
 
+@pytest.mark.nightly
 def test_a_page_that_reconnects_keeps_the_field(pair: tuple[EditorPage, EditorPage]) -> None:
     own, _ = pair
     own.page.bring_to_front()

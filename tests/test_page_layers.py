@@ -24,6 +24,7 @@ from field_page import FieldPage, field_page
 from page_fields import lumps
 from page_layers import block_layer, patch_by_hand
 from test_field_page import GONE, LEAST, MOVED, TURNED, camera, check_alike
+from tiers import nightly_after_first
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +71,7 @@ def check_patched(page: FieldPage, field: VoxelField, edits: PreparedStack) -> V
     return renderer
 
 
-@pytest.mark.parametrize("name", ["deleted", "after another", "two and another"])
+@pytest.mark.parametrize("name", nightly_after_first(["two and another", "deleted", "after another"]))
 def test_the_page_draws_patches_as_the_kernel_does(page: FieldPage, name: str) -> None:
     field = lumps(1, False)
     check_patched(page, field, stack(field, name))
@@ -81,7 +82,7 @@ def test_the_page_draws_patches_of_an_unbounded_field(page: FieldPage) -> None:
     check_patched(page, field, stack(field, "after another"))
 
 
-@pytest.mark.parametrize("contracted", [False, True])
+@pytest.mark.parametrize("contracted", nightly_after_first([False, True]))
 def test_the_page_draws_pastes_as_the_kernel_does(page: FieldPage, contracted: bool) -> None:
     """Another scene's lumps, twice: turned and scaled, put over the field's own."""
     field, other, seen = lumps(1, contracted), lumps(2, False, seed=9), camera(contracted)
@@ -103,7 +104,7 @@ def test_the_page_draws_pastes_as_the_kernel_does(page: FieldPage, contracted: b
 
 
 def test_the_page_draws_patches_as_the_oracle_does(page: FieldPage) -> None:
-    field, seen = lumps(2, False), camera(False)
+    field, seen = lumps(2, False), camera(False).resized(32, 24)
     edits = PreparedStack([TURNED, patched(field, MOVED, part=True)])
     page.edit(None)
     # Samples as close as the oracle's: cuts are seen at the first sample behind them.

@@ -23,9 +23,9 @@ from splat_scenes import splat_scene
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 
 
-SIDES = 500, 300
+SIDES = 360, 220
 """Width and height of the window."""
-HOLD = (120.0, 220.0)
+HOLD = (100.0, 160.0)
 """Where the view is taken hold of."""
 
 
@@ -68,18 +68,15 @@ def test_the_page_draws_the_view_that_is_turned(server: EditorServer, scene: Pat
         page.until("cagefield.page.why === null && cagefield.page.draws")
         page.settle()
         still = shot(page)
+        page.load(scene.parent / "half.yaml")
+        page.settle()
+        page.until("cagefield.page.draws")
         own, whole = turned(page, (90.0, 15.0))
         # Software draws few pixels; they are the right ones.
         assert db(still, whole) < 20.0
         assert db(own, whole) > 22.0
-        page.load(scene.parent / "half.yaml")
-        page.settle()
-        page.until("cagefield.page.draws")
-        full = filled(whole)
-        own, whole = turned(page, (-70.0, 5.0))
-        assert db(own, whole) > 22.0
-        # With its edits: half of the field is gone, and the picture is not the one before them.
-        assert filled(whole) < 0.75 * full and filled(own) < 0.85 * full
+        # With its edits: half of the field is gone.
+        assert filled(whole) < 0.75 * filled(still) and filled(own) < 0.85 * filled(still)
         # A context that is lost and restored draws again.
         page.page.evaluate(
             "window.lost = document.querySelector('canvas').getContext('webgl2')"

@@ -11,6 +11,7 @@ from editor_page import EditorPage, asking, editor_page
 from editor_server import editor_server
 from page_shots import HALF, alike, db, filled
 from splat_scenes import splat_scene
+from tiers import nightly_except
 
 SHELL = """\
 version: 1
@@ -79,7 +80,7 @@ def test_a_drag_of_splats_is_drawn_by_the_page_and_ends_as_the_server_draws_it(
     assert own.page.evaluate("cagefield.page.loads") == 1
 
 
-@pytest.mark.parametrize("view", ["normals", "depth", "opacity", "split"])
+@pytest.mark.parametrize("view", nightly_except(["normals", "depth", "opacity", "split"], "normals", "split"))
 def test_views_of_splats_are_the_servers(pair: tuple[EditorPage, EditorPage], view: str) -> None:
     for page in pair:
         page.page.bring_to_front()

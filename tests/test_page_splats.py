@@ -274,7 +274,12 @@ STACKS = {
 
 
 @pytest.mark.parametrize(
-    ("name", "preserve_opacity"), [*((name, True) for name in STACKS), ("stretched", False)]
+    ("name", "preserve_opacity"),
+    [
+        *((name, True) for name in ("twisted and deleted", "mirrored", "graded")),
+        ("stretched", False),
+        *(pytest.param(name, True, marks=pytest.mark.nightly) for name in ("moved", "copied")),
+    ],
 )
 def test_the_page_draws_edits_as_the_rasterizer_does(
     page: FieldPage, name: str, preserve_opacity: bool

@@ -155,6 +155,7 @@ class _StopError(Exception):
     pass
 
 
+@pytest.mark.nightly
 def test_an_interrupted_run_goes_on(photos, tmp_path, monkeypatch, capfd):
     source = tmp_path / "photos"
     source.mkdir()

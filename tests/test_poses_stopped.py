@@ -38,7 +38,6 @@ from cagefield.datasets.sfm.sfm_workspace import (
 from cagefield.datasets.sfm.structure_from_motion import make_poses
 from cagefield.errors import DatasetError
 from posed_photos import photos_alone
-from tiers import nightly_after_first
 
 pytest.importorskip("pycolmap", reason="poses are found by pycolmap")
 
@@ -167,17 +166,16 @@ def test_a_database_that_is_damaged_after_a_stop_is_made_anew(
     assert not database.parent.exists()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "reason"),
-    nightly_after_first(
-        [
-            ("cut off", "malformed"),
-            ("garbage", "file is not a database"),
-            ("empty", "no such table"),
-            ("head", ""),
-            ("zeros", ""),
-        ]
-    ),
+    [
+        ("cut off", "malformed"),
+        ("garbage", "file is not a database"),
+        ("empty", "no such table"),
+        ("head", ""),
+        ("zeros", ""),
+    ],
 )
 def test_a_damaged_database_of_a_killed_run_is_made_anew(
     stopped: Path, tmp_path: Path, name: str, reason: str
@@ -192,7 +190,8 @@ def test_a_damaged_database_of_a_killed_run_is_made_anew(
         assert make_poses(folder / "photos", folder / "data").placed == 4
 
 
-@pytest.mark.parametrize("killed", nightly_after_first([False, True]))
+@pytest.mark.nightly
+@pytest.mark.parametrize("killed", [False, True])
 def test_a_database_that_is_whole_is_left(
     stopped: Path, tmp_path: Path, killed: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -27,10 +27,9 @@ GOOD = Promises("box", 0, 0, 1, 0.5, 0.0, 1e-9, 1e-8)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_first_edits_of_every_kind_keep_their_promises(kind: str) -> None:
-    for number in range(2):
-        row = run((kind, number, 12))
-        assert row.failures == (), row
+def test_the_first_edit_of_every_kind_keeps_its_promises(kind: str) -> None:
+    row = run((kind, 0, 12))
+    assert row.failures == (), row
 
 
 @pytest.mark.nightly

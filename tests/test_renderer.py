@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from cagefield.images.metrics import psnr
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.voxels import occupancy
 from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
+from tiers import nightly_except
 
 devices.start()
 
@@ -153,6 +155,13 @@ EDITS = {
 }
 
 
+EVERY_RUN = (
+    (True, "two"),
+    *((False, name) for name in ("corner", "lattice", "points", "lattices that overlap")),
+    *((False, name) for name in ("copy of what was changed", "turned copy", "two")),
+)
+"""(contracted, edits): each kind of map, and all that edits of a stack do to each other."""
+
 FEWER_PIXELS = CAMERA.resized(20, 16)
 """A smaller view for edited fields, whose plain pictures take seconds."""
 
@@ -172,8 +181,7 @@ def unedited(contracted: bool):
     return sampled(ball(contracted), samples=200, camera=FEWER_PIXELS)
 
 
-@pytest.mark.parametrize("contracted", [False, True])
-@pytest.mark.parametrize("name", list(EDITS))
+@pytest.mark.parametrize(("contracted", "name"), nightly_except(product([False, True], EDITS), *EVERY_RUN))
 def test_edited_matches_the_plain_renderer(name, contracted):
     field, edits = ball(contracted), EDITS[name]
     renderer = VoxelRenderer(field, step=0.1).with_edits(edits)
@@ -276,7 +284,7 @@ def test_a_field_ends_at_its_grid(edited: bool) -> None:
     edits = EditStack(
         [Edit.continuous(inner, inner.grown(0.2), lattice=8).translate((0.05, 0.0, 0.0))] if edited else []
     )
-    camera = Camera.look_at((3.0, 2.4, 1.8), (0.6, 0.5, 0.4), width=32, height=32, fov_x=0.5)
+    camera = Camera.look_at((3.0, 2.4, 1.8), (0.6, 0.5, 0.4), width=20, height=20, fov_x=0.5)
     frame = VoxelRenderer(field, edits, step=0.1).render(camera, background="black")
     oracle = render_sampled(field, camera, samples=1200, background="black", edits=edits)
     assert frame is not None and psnr(frame.rgb, oracle.rgb) > 45.0

@@ -12,6 +12,7 @@ from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage
 from cagefield.selection.bounding_cages import lattice_cells, oriented_box
 from cagefield.selection.enclosing_mesh import CageMesh, cage_mesh
+from tiers import nightly_after_first
 
 
 def box_points(size: tuple[float, float, float], turn: Rotation, count: int = 3000) -> np.ndarray:
@@ -104,7 +105,7 @@ def winding_numbers(mesh: CageMesh, points: np.ndarray) -> np.ndarray:
     return np.arctan2(above, below).sum(axis=1) / (2.0 * np.pi)
 
 
-@pytest.mark.parametrize(("faces", "margin"), [(2000, 0.05), (500, 0.05), (240, 0.01)])
+@pytest.mark.parametrize(("faces", "margin"), nightly_after_first([(500, 0.05), (2000, 0.05), (240, 0.01)]))
 def test_the_mesh_is_closed_and_encloses_the_selection(faces: int, margin: float) -> None:
     pytest.importorskip("skimage", reason="scikit-image is not installed")
     chance = np.random.default_rng(0)

@@ -25,6 +25,7 @@ from cagefield.server.render_worker.tasks import PictureDone, PictureTask, Shown
 from cagefield.server.render_worker.view import Display, Region
 from scenes import ball_field, ball_scene
 from sent_pictures import pixels_of
+from tiers import nightly_except
 
 SIDE = 64
 CAMERA = Camera.look_at((0.6, -3.4, 0.9), (0, 0, 0), width=SIDE, height=SIDE, fov_x=0.8)
@@ -330,7 +331,7 @@ def test_edits_that_stay_keep_their_shadows_while_another_moves(shaded: Scene) -
     )
 
 
-@pytest.mark.parametrize("view", ["color", "depth", "opacity", "normals"])
+@pytest.mark.parametrize("view", nightly_except(["color", "depth", "opacity", "normals"], "color", "depth"))
 def test_a_part_over_the_last_picture_is_the_whole_picture(renderers: RendererCache, view: Any) -> None:
     before, after = STACKS["under another"]
     display = Display(view, split=0.55)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from cagefield.rendering.splats.reference_discs import FILTER, render_discs
 from cagefield.rendering.splats.reference_raster_splats import deformed_splats_reference
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.typing import AnyArray
+from tiers import nightly_except
 
 
 def disc(size: float, turn: float) -> SplatField:
@@ -76,8 +78,12 @@ def db(difference: AnyArray) -> float:
     return float(-10.0 * np.log10(np.mean(np.square(difference)) + 1e-12))
 
 
-@pytest.mark.parametrize("kind", ["wall", "cloud"])
-@pytest.mark.parametrize("angle", [80, 30, 5, 1])
+@pytest.mark.parametrize(
+    ("kind", "angle"),
+    nightly_except(
+        product(["wall", "cloud"], [80, 30, 5, 1]), ("wall", 80), ("wall", 1), ("cloud", 30), ("cloud", 5)
+    ),
+)
 def test_the_kernels_draw_what_the_oracle_does(kind: str, angle: float) -> None:
     field = discs(kind)
     a = np.radians(angle)

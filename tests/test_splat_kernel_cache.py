@@ -71,6 +71,7 @@ def test_a_new_installation_of_the_same_source_loads_its_kernels(tmp_path: Path)
         assert done.stdout.split() == ["3.0", str(hits)], done.stderr
 
 
+@pytest.mark.nightly
 def test_a_folder_that_cannot_be_made_is_done_without(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     printed, warned = ask(tmp_path / "file")
@@ -80,6 +81,7 @@ def test_a_folder_that_cannot_be_made_is_done_without(tmp_path: Path) -> None:
     assert "(Not a directory)" in line and "set XDG_CACHE_HOME to a folder that can be written" in line
 
 
+@pytest.mark.nightly
 def test_a_disk_that_fails_in_the_middle_is_one_line_of_warning(tmp_path: Path) -> None:
     pytest.importorskip("resource", reason="limits of a process are POSIX's")
     printed, warned = ask(tmp_path, FULL_IN_THE_MIDDLE)

@@ -60,6 +60,7 @@ def test_it_learns_views_it_has_not_seen(trained):
     assert len(trained.field.vertices) < 0.4 * np.prod(trained.field.resolution)
 
 
+@pytest.mark.nightly
 def test_the_seed_decides(dataset, trained):
     again = train_voxel(dataset, CONFIG, evaluate=False)
     assert_same(again.field.density, trained.field.density)

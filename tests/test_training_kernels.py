@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -38,6 +40,7 @@ from cagefield.training.voxels.kernels.training_march import (  # noqa: E402
     march_batch,
 )
 from cagefield.training.voxels.ray_batches import DevicePhotos  # noqa: E402
+from tiers import nightly_except  # noqa: E402
 
 SIZE = 8
 N = 9
@@ -122,8 +125,10 @@ def marched(
     return 0.5 * losses.to_numpy().astype(np.float64) + penalties.to_numpy(), squares
 
 
-@pytest.mark.parametrize("room", [0, 100, 100_000])
-@pytest.mark.parametrize("contracted", [False, True])
+@pytest.mark.parametrize(
+    ("contracted", "room"),
+    nightly_except(product([False, True], [0, 100, 100_000]), (False, 100), (False, 100_000), (True, 0)),
+)
 def test_samples_by_cell_add_up_as_those_of_workers(tmp_path, contracted, room):
     """Without room for samples, with room for some, and for all."""
     data, grid = photos(tmp_path), state(2, contracted, workers=1)
@@ -141,8 +146,10 @@ def test_samples_by_cell_add_up_as_those_of_workers(tmp_path, contracted, room):
     assert room in (0, 100) or np.count_nonzero(links.to_numpy()) > 100
 
 
-@pytest.mark.parametrize("contracted", [False, True])
-@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize(
+    ("degree", "contracted"),
+    nightly_except(product([0, 1, 2], [False, True]), (0, True), (1, False), (2, True)),
+)
 def test_gradients_match_finite_differences(tmp_path, degree, contracted):
     data, grid = photos(tmp_path), state(degree, contracted)
     gains = np.array([[1.0, 1.1, 0.9], [0.95, 1.0, 1.2], [1.0, 1.0, 1.0]])

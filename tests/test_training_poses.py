@@ -76,7 +76,7 @@ def rough(tmp_path_factory):
 
 def test_rough_poses_are_refined(rough):
     dataset, cameras = rough
-    config = SplatConfig(steps=600, splats=600, sh_degree=1)
+    config = SplatConfig(steps=400, splats=600, sh_degree=1)
     as_given = train_splat(dataset, config)
     refined = train_splat(dataset, replace(config, refine_poses=True))
     assert refined.train_psnr > as_given.train_psnr + 2

@@ -80,6 +80,7 @@ def test_it_learns_views_it_has_not_seen(capture, trained):
     assert trained.train_psnr > trained.test_psnr - 1
 
 
+@pytest.mark.nightly
 def test_the_seed_decides(capture, trained):
     again = train_splat(capture, CONFIG, evaluate=False)
     assert_same_splats(again.field, trained.field)
@@ -159,7 +160,7 @@ def test_the_world_s_units_and_axes_do_not_matter(capture):
     a, b = 0.7, -1.1
     turned = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
     turned = turned @ np.array([[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]])
-    for scale, turn in ((100.0, np.eye(3)), (0.01, np.eye(3)), (100.0, turned)):
+    for scale, turn in ((0.01, np.eye(3)), (100.0, turned)):
         rigid = np.eye(4)
         rigid[:3, :3], rigid[:3, 3] = turn, scale * np.array([0.3, -0.2, 0.5])
         moved = Similarity(rigid, scale)

@@ -151,7 +151,17 @@ def made_poses(folder: Path) -> list[str]:
     return ["poses", str(folder / "photos"), "-o", str(folder / "out")]
 
 
-@pytest.mark.parametrize("make", [demo_folder, made_scene, made_room, made_page, made_pictures, made_poses])
+@pytest.mark.parametrize(
+    "make",
+    [
+        demo_folder,
+        made_scene,
+        pytest.param(made_room, marks=pytest.mark.nightly),
+        made_page,
+        made_pictures,
+        made_poses,
+    ],
+)
 def test_the_next_run_brings_back_what_an_end_between_two_renames_left(
     tmp_path: Path,
     ended: str,

@@ -34,7 +34,7 @@ pytestmark = [
     [
         ("edit --overwrite", 15, 3),
         ("edit --overwrite, renames", 15, 9),
-        ("changes and saves", 60, 9),
+        ("changes and saves", 60, 15),
         ("save as", 15, 5),
         ("convert .sog", 8, 4),
         ("export .glb", 8, 4),
@@ -100,7 +100,7 @@ def test_a_process_ends_in_the_middle_of_a_write(tmp_path: Path) -> None:
 
 @needs_counted_writes
 @pytest.mark.parametrize(
-    ("name", "least", "step"), [("edit --overwrite", 6, 2), ("changes and saves", 14, 6)]
+    ("name", "least", "step"), [("edit --overwrite", 6, 3), ("changes and saves", 14, 6)]
 )
 def test_killed_in_the_middle_of_a_write(tmp_path: Path, name: str, least: int, step: int) -> None:
     found = Killed()

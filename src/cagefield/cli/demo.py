@@ -22,6 +22,8 @@ _OWN = (
 )  # fmt: skip
 _EYE, _TARGET, _FOV_X = (1.6, -3.5, 1.3), (0.05, 0.0, 0.13), 0.62
 """Where before.png and after.png are taken from: radians, world units."""
+_PICTURE_SIZE, _VIDEO_SIZE = 480, 256
+"""Width and height of these pictures, and of each half of the video, in pixels."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -132,12 +134,12 @@ class Demo:
         from cagefield.cameras.camera_paths import orbit
         from cagefield.images.image_files import side_by_side, write_png, write_video
 
-        camera = Camera.look_at(_EYE, _TARGET, width=480, height=480, fov_x=_FOV_X)
+        camera = Camera.look_at(_EYE, _TARGET, width=_PICTURE_SIZE, height=_PICTURE_SIZE, fov_x=_FOV_X)
         before, after = (one.render(camera).rgb8() for one in (scene, edited))
         write_png(folder / "before.png", before)
         write_png(folder / "after.png", after)
         write_png(folder / "before_after.png", side_by_side(before, after))
-        path = orbit(scene.cameras["train"], self.frames, width=256, height=256)
+        path = orbit(scene.cameras["train"], self.frames, width=_VIDEO_SIZE, height=_VIDEO_SIZE)
         pictures = (
             side_by_side(scene.render(camera).rgb8(), edited.render(camera).rgb8())
             for camera in track(path, len(path), "Turntable")
