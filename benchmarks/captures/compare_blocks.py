@@ -3,8 +3,8 @@
     python -m benchmarks.captures.street STREET
     python -m benchmarks.captures.compare_blocks STREET -o FOLDER [--blocks 4] [--steps-per-photo 20]
 
-Both get as many steps for each photo, in a process of their own. FOLDER gets a Markdown row for each,
-figures.md, and pictures of test views that see points of several cores: photo, one training, blocks, and
+Both get as many steps for each photo, in a process of their own. FOLDER gets a Markdown row for each, which a
+command that is given again keeps (remove it to measure anew), figures.md, and pictures of test views that see points of several cores: photo, one training, blocks, and
 their difference, four times as strong around gray.
 """
 
@@ -50,8 +50,13 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     rows = []
     for count in (1, options.blocks):
+        kept = options.out / f"row-{count}.md"
+        if kept.exists():
+            rows.append(kept.read_text(encoding="utf-8").rstrip("\n"))
+            continue
         with multiprocessing.get_context("spawn").Pool(1) as pool:
             rows.append(pool.apply(measure, (options, count)))
+        kept.write_text(rows[-1] + "\n", encoding="utf-8")
         print(rows[-1], flush=True)
     text = f"{cpu_model()}; {options.steps_per_photo} steps for each photo\n\n{HEADER}\n" + "\n".join(rows)
     (options.out / "figures.md").write_text(text + "\n", encoding="utf-8")

@@ -1,7 +1,7 @@
 """Blocks of a capture: a partition of space by its sparse points, and the photos that see each block.
 
-Space is divided by planes across the world's axes, each at a quantile of the points on both its sides: the
-core cells of the blocks. A core is half-open, [low, high) along each axis, and the outer ones reach to
+Space is divided by planes across the world's axes, each at a quantile of the points on both its sides, where
+each photo's points weigh 1 together: the core cells of the blocks, each the content of as many photos. A core is half-open, [low, high) along each axis, and the outer ones reach to
 infinity, so that every position is in exactly one core; a position outside the points' box is in the core
 that is nearest to it. A block's region is its core, grown by `OVERLAP` of its extent among the points at
 each inner plane. Its photos see enough points of the region; neighbors share the photos of the overlap.
@@ -85,8 +85,9 @@ def divide(dataset: Dataset, points: SparsePoints, count: int) -> tuple[Block, .
         )
     seen = visible_points(dataset.train, points)
     totals = np.asarray(seen.sum(axis=1)).ravel()
-    cores = partition(points.positions, count)
-    regions = [grown(core, points.positions) for core in cores]
+    weights = np.asarray(seen.T @ (1.0 / np.maximum(totals, 1))).ravel()
+    cores = partition(points.positions, count, weights)
+    regions = [grown(core, points.positions, weights) for core in cores]
     members = np.stack([inside_cell(region, points.positions) for region in regions])
     counts = np.stack([seen @ rows.astype(np.int32) for rows in members])
     chosen = (counts >= MIN_BLOCK_POINTS) & (counts >= MIN_PHOTO_SHARE * totals)
@@ -112,28 +113,49 @@ def check_count(count: int) -> None:
         raise CagefieldError(f"blocks is {count}; give a number from 1 to {MAX_BLOCKS}")
 
 
-def partition(positions: Array, count: int) -> list[Array]:
-    """Half-open cells [2,3] that tile space, with about equal numbers of the points [M,3] in each.
+def partition(positions: Array, count: int, weights: Array | None = None) -> list[Array]:
+    """Half-open cells [2,3] that tile space, with about equal weights [M] of the points [M,3] in each.
 
-    A cell is divided across the axis along which its points spread most, 5th to 95th percentile.
+    A cell is divided across the axis along which its points spread most, 5th to 95th percentile. Points
+    without `weights` count equally.
     """
     whole = np.array([[-np.inf] * 3, [np.inf] * 3])
-    return _divided(whole, np.asarray(positions, np.float64), count)
+    weights = np.ones(len(positions)) if weights is None else weights
+    return _divided(whole, np.asarray(positions, np.float64), np.asarray(weights, np.float64), count)
 
 
-def _divided(cell: Array, positions: Array, count: int) -> list[Array]:
+def _divided(cell: Array, positions: Array, weights: Array, count: int) -> list[Array]:
     if count == 1:
         return [cell]
-    low, high = np.quantile(positions, (0.05, 0.95), axis=0)
+    low, high = _quantiles(positions, weights, (0.05, 0.95))
     axis = int(np.argmax(high - low))
     fewer = count // 2
-    rank = round(len(positions) * fewer / count)
-    around = np.sort(positions[:, axis])[max(rank - 1, 0) : rank + 1]
-    plane = float(around.mean())
+    plane = _dividing_plane(positions[:, axis], weights, fewer / count)
     left, right = cell.copy(), cell.copy()
     left[1, axis] = right[0, axis] = plane
     below = positions[:, axis] < plane
-    return _divided(left, positions[below], fewer) + _divided(right, positions[~below], count - fewer)
+    return _divided(left, positions[below], weights[below], fewer) + _divided(
+        right, positions[~below], weights[~below], count - fewer
+    )
+
+
+def _dividing_plane(values: Array, weights: Array, share: float) -> float:
+    """Midway between the neighboring values [M] below which nearest to this share of the weights lies."""
+    order = np.argsort(values, kind="stable")
+    sums = np.cumsum(weights[order])
+    rank = int(np.argmin(np.abs(sums[:-1] - share * sums[-1]))) + 1
+    return float(values[order][rank - 1 : rank + 1].mean())
+
+
+def _quantiles(positions: Array, weights: Array, shares: tuple[float, float]) -> Array:
+    """Two quantiles [2,3] of weighted positions [M,3]."""
+    bounds = np.empty((2, 3))
+    for axis in range(3):
+        order = np.argsort(positions[:, axis], kind="stable")
+        sums = np.cumsum(weights[order])
+        ranks = np.searchsorted(sums, np.array(shares) * sums[-1])
+        bounds[:, axis] = positions[order, axis][ranks.clip(0, len(positions) - 1)]
+    return bounds
 
 
 def inside_cell(cell: Array, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
@@ -142,12 +164,16 @@ def inside_cell(cell: Array, positions: NDArray[np.floating]) -> NDArray[np.bool
     return mask
 
 
-def grown(cell: Array, positions: Array) -> Array:
-    """Cell [2,3] whose inner planes are moved outwards by OVERLAP of its extent among the points [M,3]."""
-    inside = positions[inside_cell(cell, positions)]
-    bounds = np.stack([inside.min(axis=0), inside.max(axis=0)])
+def grown(cell: Array, positions: Array, weights: Array | None = None) -> Array:
+    """Cell [2,3] whose inner planes are moved outwards by OVERLAP of its extent.
+
+    On its infinite sides the cell extends to the outer quartile of its points [M,3], of these `weights` [M].
+    """
+    inside = inside_cell(cell, positions)
+    weights = np.ones(len(positions)) if weights is None else weights
+    bounds = _quantiles(positions[inside], weights[inside], (0.25, 0.75))
     extent = np.where(np.isfinite(cell), cell, bounds)
-    margin = OVERLAP * (extent[1] - extent[0])
+    margin = OVERLAP * np.abs(extent[1] - extent[0])
     return cell + np.stack([-margin, margin])
 
 
