@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
 from benchmarks.captures.street import write_street
+
 from cagefield import Scene
 from cagefield.cli import main
 from cagefield.cli.train import Train
@@ -98,7 +98,7 @@ def test_blocks_of_a_cluster_are_those_of_one_process(
 def test_a_cluster_goes_on_with_the_blocks_of_an_interrupted_training(
     street: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Ctrl-C amid block 2 here; with --resume block 1 is not trained again, wherever block 2 is."""
+    """Ctrl-C amid block 2 here; with --resume neither scaffold nor block 1 is trained again on a cluster."""
     from cagefield.training.splats.splat_run import SplatRun
 
     assert train(street, tmp_path / "whole", "--blocks", 2) == 0
@@ -108,7 +108,7 @@ def test_a_cluster_goes_on_with_the_blocks_of_an_interrupted_training(
         if run.step == 0:
             begun.append(run)
         advance(run)
-        if len(begun) == 2 and run.step == 10:
+        if len(begun) == 3 and run.step == 10:
             signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(SplatRun, "advance", pressed)
@@ -116,6 +116,7 @@ def test_a_cluster_goes_on_with_the_blocks_of_an_interrupted_training(
     blocks = tmp_path / "scene.blocks"
     assert sorted(path.name for path in blocks.iterdir()) == [
         "block-0001.json", "block-0001.safetensors", "block-0002.training",
+        "scaffold.json", "scaffold.safetensors",
     ]  # fmt: skip
     first = (blocks / "block-0001.safetensors").stat().st_mtime_ns
     monkeypatch.setattr(SplatRun, "advance", advance)
