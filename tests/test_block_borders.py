@@ -16,11 +16,11 @@ from cagefield.formats.splats.splat_files import read_splats
 from cagefield.training.splats.blocks import Block, merge, partition
 from splat_scenes import ball_of_splats, splat_scene
 
-INNER = Cage.box((0.05, 0.1, 0.2), 0.5)
+INNER = Cage.box((0.05, 0.1, 0.0), (0.6, 0.7, 1.2))
 EDITS = {
     "bent": Edit.continuous(INNER, INNER.grown(0.5)).rotate((0.2, 0.0, 0.7)).scale((1.4, 1.0, 0.8)),
     "moved": Edit.move(INNER, fill="none").rotate((0.0, 0.4, 0.0)).translate((0.3, 0.0, 0.1)),
-    "graded": Edit.continuous(INNER.subdivided((1, 1, 4)), INNER.grown(0.5)).bend("z", 0.8).grade(exposure=0.4),
+    "graded": Edit.continuous(INNER, INNER.grown(0.5)).translate((0.1, 0.0, 0.2)).grade(exposure=0.4),
 }
 
 
@@ -37,9 +37,10 @@ def scenes() -> tuple[Scene, Scene]:
     ball = ball_of_splats()
     cells = partition(ball.means, 4)
     blocks = [Block(cell, cell, (), np.arange(0), 0, 0, np.zeros((1, 3)), 0.499) for cell in cells]
-    assert sum(bool(INNER.contains(ball.means[block.contains(ball.means)]).any()) for block in blocks) == 4
     away = dataclasses.replace(ball, means=ball.means + np.float32(9.0), bounds=ball.bounds)
     near = dataclasses.replace(ball, means=0.99 * ball.means, bounds=ball.bounds)
+    inside = INNER.contains(near.means.astype(np.float64))
+    assert all(0 < (inside & block.contains(near.means)).sum() < inside.sum() for block in blocks)
     merged = merge(blocks, [near] * 4, away)
     one = dataclasses.replace(
         near,
