@@ -59,7 +59,7 @@ def test_the_command_trains_and_resumes_blocks(
     words = ["train", str(capture), "-o", str(scene), "--blocks", "2", "--steps", "60", "--keep-poses"]
     train_block = training.train_block
     monkeypatch.setattr(
-        training, "train_block", lambda job, on_stage=None: job.number == 0 and train_block(job, on_stage)
+        training, "train_block", lambda job, on_stage=None: job.number <= 0 and train_block(job, on_stage)
     )
     assert main(words) == 130  # as by Ctrl-C in the second block
     said = capsys.readouterr()
@@ -102,7 +102,7 @@ def test_two_blocks_are_as_good_as_one_training(capture: Path, tmp_path: Path) -
         (["--blocks", "0"], "blocks is 0; give a number from 1"),
         (["--blocks", "2", "--refine-poses"], "leave out --refine-poses"),
         (["--blocks", "2", "--field", "voxel"], "--blocks is for splats"),
-        (["--cluster", "2"], "--cluster trains blocks; give --blocks too"),
+        (["--cluster", "2"], "--cluster trains blocks or several captures; give --blocks too"),
     ],
 )
 def test_options_that_are_refused(

@@ -14,16 +14,16 @@ import yaml
 
 from cagefield.cli import main, parse
 from cagefield.cli.render import Render
+from cagefield.cli.train import Train
 from scenes import ball_scene, files_of
 
 PAGE = Path(__file__).parents[1] / "docs/how-to/cluster.md"
 
 
-def block(kind: str) -> str:
-    """The page's first text of a kind."""
-    found = re.search(rf"```{kind}\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    assert found is not None
-    return found.group(1)
+def block(kind: str, number: int = 0) -> str:
+    """A text of the page of a kind, by default the first one."""
+    texts: list[str] = re.findall(rf"```{kind}\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    return texts[number]
 
 
 def command(folder: Path, script: str) -> dict[str, str]:
@@ -54,6 +54,26 @@ def test_the_slurm_array_renders_every_frame_once(tmp_path: Path) -> None:
         )
     lines = (tmp_path / "log").read_text(encoding="utf-8").splitlines()
     assert sorted(frame for line in lines for frame in frames(line.split())) == list(range(240))
+
+
+def test_the_slurm_array_trains_every_capture_and_resumes_what_was_stopped(tmp_path: Path) -> None:
+    text = block("bash", 1)
+    (tmp_path / "array.sh").write_text(text, encoding="utf-8")
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes/STREET.training").touch()
+    environment = command(tmp_path, 'echo "$@" >> "$LOG"') | {"LOG": str(tmp_path / "log")}
+    assert "--array=0-2" in text
+    for task in range(3):
+        subprocess.run(
+            ["sh", tmp_path / "array.sh"],
+            env=environment | {"SLURM_ARRAY_TASK_ID": str(task)},
+            check=True,
+            cwd=tmp_path,
+        )
+    trainings = [parse(line.split()) for line in (tmp_path / "log").read_text(encoding="utf-8").splitlines()]
+    assert all(isinstance(training, Train) for training in trainings)
+    found = [(str(one.photos.data), str(one.out), one.resume) for one in trainings]  # type: ignore[union-attr]
+    assert found == [(name, f"scenes/{name}", name == "STREET") for name in ("ROOM", "STREET", "GARDEN")]
 
 
 def test_the_job_template_names_every_frame() -> None:

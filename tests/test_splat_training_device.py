@@ -181,6 +181,28 @@ def test_nothing_in_sight_changes_nothing() -> None:
         np.testing.assert_array_equal(getattr(device.state, part.name), getattr(before, part.name))
 
 
+def test_frozen_splats_take_no_step_on_either_device() -> None:
+    """Half of the splats are frozen; the others take the steps that they take beside the same splats."""
+    view = camera("pinhole", 40, 27)
+    state = state_of(parameters(40, 2, seed=3))
+    state.ticks[::2] = -1
+    target = np.random.default_rng(0).integers(0, 256, (27, 40, 3)).astype(np.uint8)
+    before = replace(state)
+    before.take(np.arange(40))
+    free = replace(before, ticks=np.zeros(40, np.int32))
+    moving = CpuSplatOptimizer(free, NEAR, True)
+    for optimizer in (moving, *pair_of(state, True)):
+        compared(optimizer, view, photo_of(target, np.zeros(3)))
+        optimizer.update(RULE)
+        after = optimizer.state
+        for part in fields(SplatState):
+            if part.name in SCRATCH or optimizer is moving:
+                continue
+            np.testing.assert_array_equal(getattr(after, part.name)[::2], getattr(before, part.name)[::2])
+        assert_close(after.means[1::2] - before.means[1::2], free.means[1::2] - before.means[1::2], 1e-2, "")
+        assert (after.means[1::2] != before.means[1::2]).any()
+
+
 @pytest.fixture(scope="module")
 def capture(tmp_path_factory):
     ball, folder = painted_ball(120), tmp_path_factory.mktemp("device") / "ball"

@@ -1,4 +1,4 @@
-"""Blocks of a capture: partition, photos, gains, merging, training that goes on where it stopped."""
+"""Blocks of a capture: partition, photos, scaffold, merging, training that goes on where it stopped."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.training.splats import train_blocks as training
 from cagefield.training.splats.blocks import (
+    FAR_DEPTHS,
     MIN_BLOCK_POINTS,
     MIN_PHOTO_SHARE,
     Block,
-    align_gains,
     block_dataset,
     divide,
     inside_cell,
@@ -25,7 +25,9 @@ from cagefield.training.splats.blocks import (
     partition,
     visible_points,
 )
+from cagefield.training.splats.scaffold import scaffold_dataset
 from cagefield.training.splats.splat_config import SplatConfig
+from cagefield.training.splats.splat_run import SplatRun
 from cagefield.training.splats.train_blocks import plan_blocks, read_block, train_block, train_blocks
 from cagefield.training.splats.train_splats import train_splat
 from splat_captures import around, as_dataset, painted_ball, photos_of, points_near, write_views
@@ -129,43 +131,97 @@ def halves() -> tuple[Block, Block]:
     return left, right
 
 
-def test_gains_of_shared_photos_fix_the_blocks_factors() -> None:
-    """Gains with known factors between blocks come back, up to the mean of 1."""
-    chance = np.random.default_rng(2)
-    true = np.exp(chance.uniform(-0.2, 0.2, (9, 3)))
-    factors = np.array([[1.0, 1.1, 0.9], [0.8, 1.3, 1.0]])
-    blocks = halves()
-    gains = [
-        (true[list(block.photos)] * factor).astype(np.float32)
-        for block, factor in zip(blocks, factors, strict=True)
-    ]
-    found, merged = align_gains(blocks, gains, 10)
-    np.testing.assert_allclose(merged[:9], true / true.mean(axis=0), rtol=1e-5)
-    np.testing.assert_array_equal(merged[9], 1.0)
-    # photo = gain x color: the colors times found factors are those that the merged gains explain
-    for block, gain, factor in zip(blocks, gains, found, strict=True):
-        np.testing.assert_allclose(merged[list(block.photos)] * factor, gain, rtol=1e-5)
+def test_merged_splats_are_those_that_blocks_contain_and_the_scaffolds_elsewhere() -> None:
+    """Near splats from the block of their core; far ones, and those of a missing block, from the scaffold."""
+    ball, fields = painted_ball(80), []
+    for shift in (0.0, 0.1, 0.2):
+        moved = 5.0 * ball.means + np.float32(shift)
+        fields.append(dataclasses.replace(ball, means=moved, bounds=ball.bounds))
+    reach = float(np.median(np.linalg.norm(fields[2].means, axis=1)))
+    blocks = [dataclasses.replace(block, cameras=np.zeros((1, 3)), reach=reach) for block in halves()]
+    found = merge(blocks, fields[:2], fields[2])
+    near = [np.linalg.norm(field.means.astype(float), axis=1) < reach for field in fields]
+    rows = [inside_cell(block.core, field.means) for block, field in zip(blocks, fields[:2], strict=True)]
+    expected = [fields[0].means[rows[0] & near[0]], fields[1].means[rows[1] & near[1]]]
+    np.testing.assert_array_equal(found.means, np.concatenate([*expected, fields[2].means[~near[2]]]))
+    assert all(len(part) for part in expected) and 0 < near[2].sum() < 80
+    half = merge(blocks[:1], fields[:1], fields[2])
+    rest = ~(inside_cell(blocks[0].core, fields[2].means) & near[2])
+    np.testing.assert_array_equal(half.means, np.concatenate([expected[0], fields[2].means[rest]]))
 
 
-def test_merged_splats_are_those_in_the_cores() -> None:
-    ball = painted_ball(80)
-    blocks, fields = halves(), []
-    for shift in (0.0, 0.1):
-        fields.append(
-            dataclasses.replace(ball, means=5.0 * ball.means + np.float32(shift), bounds=ball.bounds)
-        )
-    factors = np.array([[1.0, 1.0, 1.0], [0.5, 1.0, 2.0]])
-    found = merge(blocks, fields, factors)
-    rows = [block.contains(field.means) for block, field in zip(blocks, fields, strict=True)]
-    expected = np.concatenate([field.means[row] for field, row in zip(fields, rows, strict=True)])
-    np.testing.assert_array_equal(found.means, expected)
-    assert rows[1].any() and 0 < rows[0].sum() < 80
-    along = np.tile([[0.0, 0.0, 1.0]], (80, 1))
-    last = found.means[-1:]
-    color = fields[1].take(rows[1])(last, along[:1])[1]
-    np.testing.assert_allclose(
-        found.take(np.arange(rows[0].sum(), len(found)))(last, along[:1])[1], color * factors[1], atol=1e-5
+def test_far_content_is_in_no_block(capture: Dataset) -> None:
+    """Oracle: the nearest camera, the median distance of points from the photos that see them, by loops."""
+    points = street(capture)
+    blocks = divide(capture, points, 3)
+    origins = {view.name: view.camera.origin for view in capture.train}
+    pairs = zip(points.positions, points.seen_by, strict=True)
+    distances = [float(np.linalg.norm(origins[name] - p)) for p, names in pairs for name in names]
+    positions = np.random.default_rng(0).uniform(-60, 60, (300, 3))
+    nearest = np.min([np.linalg.norm(positions - origin, axis=1) for origin in origins.values()], axis=0)
+    held = np.stack([block.contains(positions) for block in blocks])
+    np.testing.assert_array_equal(held.sum(axis=0), nearest < FAR_DEPTHS * np.median(distances))
+    for block, mask in zip(blocks, held, strict=True):
+        assert (block.trains(positions) >= mask).all()
+
+
+def test_blocks_have_equal_shares_of_the_photos_points(capture: Dataset) -> None:
+    """Each photo weighs 1: points that one photo sees of thousands do not draw the planes to them."""
+    points = street(capture)
+    chance = np.random.default_rng(5)
+    many = chance.normal((40.0, 0, 0), 0.5, (4000, 3))
+    name = capture.train[7].name
+    crowded = SparsePoints(
+        np.concatenate([points.positions, many]),
+        np.zeros((4400, 3), np.uint8),
+        (*points.seen_by, *[frozenset({name})] * 4000),
     )
+    plane = divide(capture, crowded, 2)[0].core[1, 0]
+    before = divide(capture, points, 2)[0].core[1, 0]
+    assert abs(plane - before) < 1.0 < abs(np.median(crowded.positions[:, 0]) - before)
+
+
+def test_a_block_is_trained_among_frozen_splats_of_the_scaffold(capture: Dataset, tmp_path: Path) -> None:
+    blocks, jobs = plan_blocks(capture, QUICK, 2, tmp_path)
+    scaffold = jobs[0].scaffold
+    assert scaffold is not None and scaffold is jobs[1].scaffold
+    assert (scaffold.config.steps, scaffold.config.splats) == (30, 200)
+    with pytest.raises(CagefieldError, match=r"scaffold\.safetensors is not there; the folder must be"):
+        jobs[0].context()
+    assert train_block(scaffold)
+    coarse = read_block(scaffold)
+    context = jobs[0].context()
+    assert coarse is not None and context is not None and 0 < len(context.frozen) < len(coarse.field)
+    assert not blocks[0].trains(context.frozen.means).any()
+    photos = list(blocks[0].photos)
+    np.testing.assert_array_equal(context.gains, coarse.gains[photos])
+    run = SplatRun(jobs[0].dataset, jobs[0].config, context=context)
+    frozen = len(context.frozen)
+    assert run.state.frozen.sum() == frozen and blocks[0].trains(run.state.means[:-frozen]).all()
+    while run.done < 1.0:
+        run.advance()
+    for name in ("means", "log_scales", "sh"):
+        after = getattr(run.state, name)[run.state.frozen]
+        np.testing.assert_array_equal(after, getattr(context.frozen, name).reshape(after.shape))
+    np.testing.assert_array_equal(run.gains, context.gains)
+    assert len(run.field()) == len(run.state) - frozen <= jobs[0].config.splats
+    assert np.isfinite(run.running_loss)
+
+
+@pytest.mark.parametrize(
+    ("size", "factor"), [((60, 40), 1), ((400, 300), 2), ((96, 100), 2), ((95, 400), 1), ((6000, 4000), 4)]
+)
+def test_photos_of_the_scaffold(capture: Dataset, size: tuple[int, int], factor: int) -> None:
+    """Half the size, or less for more than 50 million pixels, here of 12 photos; 48 pixels at the least."""
+    views = [
+        dataclasses.replace(view, camera=view.camera.resized(*size))
+        for view in (*capture.train, *capture.test)
+    ]
+    small = scaffold_dataset(dataclasses.replace(capture, train=tuple(views)))
+    assert {(v.camera.width, v.camera.height) for v in small.train} == {
+        (size[0] // factor, size[1] // factor)
+    }
+    assert small.test == ()
 
 
 def same(a: SplatField, b: SplatField) -> bool:

@@ -2,10 +2,13 @@
 
     python -m benchmarks.captures.street STREET
     python -m benchmarks.captures.compare_blocks STREET -o FOLDER [--blocks 4] [--steps-per-photo 20]
+        [--processes 1]
 
-Both get as many steps for each photo, in a process of their own. FOLDER gets a Markdown row for each,
-figures.md, and pictures of test views that see points of several cores: photo, one training, blocks, and
-their difference, four times as strong around gray.
+Both get as many steps for each photo; the scaffold and each block in a process of its own, so many at a time.
+FOLDER gets a Markdown row for each, figures.md, and pictures of test views that see points of several cores:
+photo, one training, blocks, and their difference, four times as strong around gray. A command that is given
+again goes on; remove the folder to measure anew. Processor time is the sum over all processes, peak memory
+that of the largest.
 """
 
 from __future__ import annotations
@@ -22,13 +25,19 @@ from benchmarks.common.machine import cpu_model
 from cagefield.compute import devices
 from cagefield.datasets import load_dataset
 from cagefield.datasets.sfm.sparse_points import points_cache_folder, starting_points
-from cagefield.datasets.views import View
+from cagefield.datasets.views import Dataset, View
 from cagefield.fields.splat_field import SplatField
 from cagefield.images.image_files import side_by_side, write_png
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.training.splats.blocks import Block, divide, left_out, visible_points
 from cagefield.training.splats.splat_config import SplatConfig
-from cagefield.training.splats.train_blocks import plan_blocks, train_blocks
+from cagefield.training.splats.train_blocks import (
+    BlockJob,
+    plan_blocks,
+    read_block,
+    train_block,
+    train_blocks,
+)
 
 HEADER = (
     "| capture | training | photos of each block | splats | steps | processor time | test PSNR | corrected "
@@ -46,29 +55,55 @@ def main() -> None:
     parser.add_argument("--steps-per-photo", type=int, default=20)
     parser.add_argument("--splats", type=int)
     parser.add_argument("--downscale", type=int)
+    parser.add_argument("--processes", type=int, default=1)
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     rows = []
     for count in (1, options.blocks):
-        with multiprocessing.get_context("spawn").Pool(1) as pool:
-            rows.append(pool.apply(measure, (options, count)))
+        kept = options.out / f"row-{count}.md"
+        if not kept.exists():
+            numbers = [-1, *range(count)] if count > 1 else [0]
+            for group in (numbers[:1], numbers[1:]):
+                with multiprocessing.get_context("spawn").Pool(options.processes, maxtasksperchild=1) as pool:
+                    pool.starmap(train_one, [(options, count, number) for number in group], chunksize=1)
+            kept.write_text(measure(options, count) + "\n", encoding="utf-8")
+        rows.append(kept.read_text(encoding="utf-8").rstrip("\n"))
         print(rows[-1], flush=True)
     text = f"{cpu_model()}; {options.steps_per_photo} steps for each photo\n\n{HEADER}\n" + "\n".join(rows)
     (options.out / "figures.md").write_text(text + "\n", encoding="utf-8")
     draw(options)
 
 
-def measure(options: Any, count: int) -> str:
-    """The row of a training in `count` blocks; its field is kept in the folder."""
+def plan(options: Any, count: int) -> tuple[Dataset, tuple[Block, ...], tuple[BlockJob, ...]]:
+    """The capture with the blocks and the trainings of a comparison."""
     devices.start("cpu")
     dataset = load_dataset(options.capture, downscale=options.downscale)
     config = SplatConfig(steps=options.steps_per_photo * len(dataset.train), splats=options.splats)
-    blocks, jobs = plan_blocks(dataset, config, count, options.out / f"blocks-{count}")
+    return dataset, *plan_blocks(dataset, config, count, options.out / f"blocks-{count}")
+
+
+def train_one(options: Any, count: int, number: int) -> None:
+    """Trains a block, or the scaffold (-1), and adds its processor time and peak memory to a file."""
+    _, _, jobs = plan(options, count)
+    job = jobs[0].scaffold if number < 0 else jobs[number]
+    if job is None or read_block(job) is not None:
+        return
+    train_block(job)
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    row = f"{used.ru_utime + used.ru_stime:.1f} {used.ru_maxrss / 1e3:.0f}\n"
+    with job.path(".usage").open("a", encoding="utf-8") as file:
+        file.write(row)
+
+
+def measure(options: Any, count: int) -> str:
+    """The row of a training in `count` finished blocks; its field is kept in the folder."""
+    dataset, blocks, jobs = plan(options, count)
     for block, job in zip(blocks, jobs, strict=True):
         print(f"{job.name} of {count}: {block.describe()}", flush=True)
     result = train_blocks(dataset, blocks, jobs)
     result.field.save(options.out / f"field-{count}.safetensors")
-    used = resource.getrusage(resource.RUSAGE_SELF)
+    usage = [np.loadtxt(path, ndmin=2) for path in jobs[0].folder.glob("*.usage")]
+    seconds, memory = np.concatenate(usage).T
     photos = ", ".join(str(len(block.photos)) for block in blocks)
     lost = len(left_out(dataset, blocks))
     columns = (
@@ -77,11 +112,11 @@ def measure(options: Any, count: int) -> str:
         photos + (f" ({lost} of {len(dataset.train)} in none)" if lost else ""),
         f"{len(result.field)}",
         f"{result.steps}",
-        f"{used.ru_utime + used.ru_stime:.0f} s",
+        f"{seconds.sum():.0f} s",
         f"{result.test.psnr:.2f} dB",
         f"{result.test.corrected:.2f} dB",
         f"{result.test.ssim:.3f}",
-        f"{used.ru_maxrss / 1e3:.0f} MB",
+        f"{memory.max():.0f} MB",
     )
     return "| " + " | ".join(columns) + " |"
 

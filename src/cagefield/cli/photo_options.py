@@ -59,4 +59,13 @@ class PhotoOptions:
         return verified(dataset, correct=given and not keep_poses, stream=sys.stderr).dataset
 
 
+@dataclass(frozen=True)
+class CaptureOptions(PhotoOptions):
+    """Which photos are used, of one capture or of several."""
+
+    more: tyro.conf.Positional[tuple[Path, ...]] = ()
+    """More captures: each is trained into a scene of its own, one after another or on the cluster."""
+
+
+Captures = tyro.conf.OmitArgPrefixes[CaptureOptions]
 Photos = tyro.conf.OmitArgPrefixes[PhotoOptions]

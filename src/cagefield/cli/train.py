@@ -22,8 +22,9 @@ from cagefield.cli.options import (
     progress_bar,
     stages,
 )
-from cagefield.cli.photo_options import Photos
+from cagefield.cli.photo_options import Captures
 from cagefield.errors import CagefieldError, line_of
+from cagefield.files.safe_open import real_path
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
@@ -50,9 +51,9 @@ VOXEL_FOG_WARNING = (
 class Train:
     """Train a field on posed photos and write a scene; Ctrl-C ends earlier and writes what there is."""
 
-    photos: Photos
+    photos: Captures
     out: Output
-    """Scene folder."""
+    """Scene folder; of several captures a folder for their scenes, named as the captures."""
     field: FieldKind = "auto"
     """splat are 3D Gaussians, made for captures of real places; voxel is a grid, made for things on a plain
     background; both are trained on the GPU where there is one. auto takes splats where a capture is
@@ -63,8 +64,10 @@ class Train:
     """Train splats in so many blocks of space, one after another, each on the photos that see it, and merge
     them: for captures larger than the memory. A block has its photos' share of --splats and of the time."""
     cluster: str | None = None
-    """Train the blocks on a cluster of dask.distributed, as `cagefield render`; photos and the scene's folder
-    are on a disk that its machines share."""
+    """Train the blocks, or several captures, on a cluster of dask.distributed, as `cagefield render`; photos
+    and the scene's folder are on a disk that its machines share."""
+    cluster_tls: tuple[Path, Path, Path] | None = None
+    """CA CERT KEY: PEM files for the connections to and in the cluster."""
     robust: Flag = False
     """Give less weight to regions of photos that contradict the others: people who walk through, a backdrop
     that moves; for splats."""
@@ -86,21 +89,19 @@ class Train:
     def run(self) -> None:
         """Trains, writes the scene, prints the test PSNR."""
         from cagefield.compute import devices
-        from cagefield.scene.scene_files import check_destination
 
         if self.field != "nerf" and (self.preset != "auto" or self.ndc != "auto"):
             raise CagefieldError("--preset and --ndc are for the original NeRF; give --field nerf too")
         for option, given in self._splat_options():
             if given and self.field not in ("splat", "auto"):
                 raise CagefieldError(f"{option} is for splats; give --field splat too")
-        target = check_destination(self.out, self.overwrite or self.resume)
-        checkpoint = target.with_name(target.name + (".training" if self.blocks is None else ".blocks"))
-        if checkpoint.exists() and not (self.resume or self.overwrite):
-            raise CagefieldError(
-                f"{checkpoint} is an interrupted training; give --resume to go on, or --overwrite"
-            )
-        if self.resume and not checkpoint.exists():
-            raise CagefieldError(f"no checkpoint at {checkpoint} to resume from; start anew")
+        if self.photos.more:
+            from cagefield.cli.train_captures import train_captures
+
+            self._check_options()
+            train_captures(self)
+            return
+        target, checkpoint = self.check_target(), self.checkpoint()
         self._check_options()
         dataset = self.photos.load(target.with_name(target.name + ".poses"), self.training.minutes)
         kind = self._kind(dataset)
@@ -121,6 +122,7 @@ class Train:
                 checkpoint,
                 anew=not self.resume,
                 cluster=self.cluster,
+                cluster_tls=self.cluster_tls,
                 device=self.device,
             )
             figures, finished = summary(splats), splats.finished
@@ -144,6 +146,29 @@ class Train:
         else:
             shutil.rmtree(checkpoint, ignore_errors=True)
 
+    def checkpoint(self) -> Path:
+        """File of the interrupted training, or the folder of its blocks."""
+        target = real_path(self.out)
+        return target.with_name(target.name + (".training" if self.blocks is None else ".blocks"))
+
+    def check_target(self) -> Path:
+        """The resolved scene folder.
+
+        Raises:
+            CagefieldError: something is there that may not be replaced, an interrupted training, or none to
+                resume.
+        """
+        from cagefield.scene.scene_files import check_destination
+
+        target, checkpoint = check_destination(self.out, self.overwrite or self.resume), self.checkpoint()
+        if checkpoint.exists() and not (self.resume or self.overwrite):
+            raise CagefieldError(
+                f"{checkpoint} is an interrupted training; give --resume to go on, or --overwrite"
+            )
+        if self.resume and not checkpoint.exists():
+            raise CagefieldError(f"no checkpoint at {checkpoint} to resume from; start anew")
+        return target
+
     def _splat_options(self) -> tuple[tuple[str, bool], ...]:
         """Options that splats alone take, and whether they are given."""
         return (
@@ -164,10 +189,14 @@ class Train:
         if self.cluster is not None:
             from cagefield.cluster.connection import check_installed, parse_cluster
 
-            if self.blocks is None:
-                raise CagefieldError("--cluster trains blocks; give --blocks too")
+            if self.blocks is None and not self.photos.more:
+                raise CagefieldError("--cluster trains blocks or several captures; give --blocks too")
             parse_cluster(self.cluster)
             check_installed()
+        if self.cluster_tls and self.cluster is None:
+            raise CagefieldError("--cluster-tls belongs to --cluster; give both or neither")
+        if self.photos.more and self.photos.masks is not None:
+            raise CagefieldError("--masks is of one capture; train the captures one by one")
         if self.field in ("auto", "splat"):
             self.training.splat_config(self.splats, self.refine_poses, self.robust)
         # Splats take harmonics of degree 3, voxels do not: with "auto" the photos decide.

@@ -27,6 +27,7 @@ def train_in_blocks(
     *,
     anew: bool = False,
     cluster: str | None = None,
+    cluster_tls: tuple[Path, Path, Path] | None = None,
     device: str = "auto",
 ) -> tuple[Scene, TrainResult[SplatField]]:
     """The scene of all blocks and the figures of the training; `folder` keeps finished blocks, unless `anew`.
@@ -56,14 +57,16 @@ def train_in_blocks(
             result = train_blocks(dataset, blocks, jobs, on_stage=move)
     else:
         result = train_blocks(
-            dataset, blocks, jobs, trainer=lambda missing: _on_cluster(cluster, missing, device)
+            dataset, blocks, jobs, trainer=lambda missing: _on_cluster(cluster, cluster_tls, missing, device)
         )
     return Scene.trained(result, dataset), result
 
 
-def _on_cluster(cluster: str, jobs: Sequence[BlockJob], device: str) -> Iterator[BlockJob]:
+def _on_cluster(
+    cluster: str, tls: tuple[Path, Path, Path] | None, jobs: Sequence[BlockJob], device: str
+) -> Iterator[BlockJob]:
     """The jobs, each once a worker has written its files."""
-    from cagefield.cluster.connection import parse_cluster
+    from cagefield.cluster.connection import TlsFiles, parse_cluster
     from cagefield.cluster.tasks import Task, run_tasks
     from cagefield.training.splats.train_blocks import train_block
 
@@ -72,6 +75,7 @@ def _on_cluster(cluster: str, jobs: Sequence[BlockJob], device: str) -> Iterator
         parse_cluster(cluster),
         {name: Task(train_block, (job,)) for name, job in named.items()},
         device=device,
+        tls=TlsFiles(*tls) if tls else None,
     ):
         print(f"{name}: done", file=sys.stderr)
         yield named[name]

@@ -30,12 +30,18 @@ class Task:
 
 
 def run_tasks(
-    cluster: int | str, tasks: Mapping[str, Task], *, device: str = "auto", tls: TlsFiles | None = None
+    cluster: int | str,
+    tasks: Mapping[str, Task],
+    *,
+    device: str = "auto",
+    tls: TlsFiles | None = None,
+    failures: dict[str, str] | None = None,
 ) -> Iterator[tuple[str, Any]]:
     """Name and result of each task, in the order in which they are complete.
 
     `cluster` is a number of local workers, an address or a scheduler file; `device` is the workers'. Lost
-    workers are counted in a warning at the end.
+    workers are counted in a warning at the end. A task that fails ends the others; with `failures` they go
+    on, and it gets the message by the task's name.
 
     Raises CagefieldError of a task with its name, without a reply, and where several workers were lost with
     one task.
@@ -45,17 +51,23 @@ def run_tasks(
             client.submit(_outcome, device, task, retries=RETRIES, pure=False): name
             for name, task in tasks.items()
         }
-        for name, (result, error) in results_of(client, futures):
-            if error:
+        for name, (result, error) in results_of(client, futures, failures=failures):
+            if not error:
+                yield name, result
+            elif failures is None:
                 raise CagefieldError(f"{name}: {error}")
-            yield name, result
+            else:
+                failures[name] = error
 
 
-def results_of(client: Client, futures: dict[Future, str], kind: str = "") -> Iterator[tuple[str, Any]]:
+def results_of(
+    client: Client, futures: dict[Future, str], kind: str = "", *, failures: dict[str, str] | None = None
+) -> Iterator[tuple[str, Any]]:
     """Name and result of each future, in the order in which they are complete; `futures` is emptied.
 
     Those that are not done are cancelled when the iteration ends early. Messages begin with `kind` and the
-    name. Raises CagefieldError for lost workers and a lost connection.
+    name. Raises CagefieldError for lost workers, unless `failures` takes the message, and for a lost
+    connection.
     """
     from distributed import CancelledError, KilledWorker, as_completed
 
@@ -68,10 +80,15 @@ def results_of(client: Client, futures: dict[Future, str], kind: str = "") -> It
             try:
                 result = future.result()
             except KilledWorker as error:
-                raise CagefieldError(
-                    f"{kind}{name}: {int(getattr(error, 'allowed_failures', 3)) + 1} workers ended while "
-                    "they worked on it, for want of memory perhaps; use fewer workers, and --keep or --resume"
-                ) from None
+                message = (
+                    f"{int(getattr(error, 'allowed_failures', 3)) + 1} workers ended while they worked on "
+                    "it, for want of memory perhaps; use fewer workers, and --keep or --resume"
+                )
+                if failures is None:
+                    raise CagefieldError(f"{kind}{name}: {message}") from None
+                failures[name] = message
+                waiting.discard(future)
+                continue
             except CancelledError:
                 raise CagefieldError(
                     "the connection to the cluster is lost; go on with --keep or --resume"

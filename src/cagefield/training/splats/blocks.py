@@ -1,14 +1,16 @@
 """Blocks of a capture: a partition of space by its sparse points, and the photos that see each block.
 
-Space is divided by planes across the world's axes, each at a quantile of the points on both its sides: the
-core cells of the blocks. A core is half-open, [low, high) along each axis, and the outer ones reach to
-infinity, so that every position is in exactly one core; a position outside the points' box is in the core
-that is nearest to it. A block's region is its core, grown by `OVERLAP` of its extent among the points at
-each inner plane. Its photos see enough points of the region; neighbors share the photos of the overlap.
+Space is divided by planes across the world's axes, each at a quantile of the points on both its sides, where
+each photo's points weigh 1 together: the core cells of the blocks, each the content of as many photos. A core
+is half-open, [low, high) along each axis, and the outer ones reach to infinity, so that every position is in
+exactly one core; a position outside the points' box is in the core that is nearest to it. A block's region is
+its core, grown by `OVERLAP` of its extent among the points at each inner plane. Its photos see enough points
+of the region; neighbors share the photos of the overlap.
 
-Each block is trained by itself (`train_blocks`). The merged field takes of each block the splats whose means
-lie in its core. Photos' exposure gains are known in each block up to a factor; the photos that blocks share
-fix the factors.
+Content farther from all cameras than `FAR_DEPTHS` median depths, the sky for example, belongs to no block: it
+is the scaffold's (`scaffold`), which all photos train. Each block is trained by itself (`train_blocks`), with
+the scaffold's splats around it. The merged field takes of each block the splats whose means lie in its core
+and near cameras, and of the scaffold those in no block.
 
 Source: the division follows VastGaussian (Lin et al. 2024, section 4), with visibility from the points of
 the reconstruction.
@@ -22,10 +24,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.errors import CagefieldError
-from cagefield.fields.sh import scale_sh_colors
 from cagefield.fields.splat_field import SplatField
 from cagefield.typing import Array
 
@@ -35,6 +37,8 @@ MIN_BLOCK_POINTS = 10
 """Minimum number of a region's points that a photo of the block sees."""
 MIN_PHOTO_SHARE = 0.25
 """Minimum share of the points that a photo sees which are the region's."""
+FAR_DEPTHS = 3.0
+"""Distance from the nearest camera beyond which content is far, in median distances of points from photos."""
 MAX_BLOCKS = 10_000
 
 
@@ -48,6 +52,8 @@ class Block:
         photos: numbers of the training photos, ascending.
         points: rows of the points that two of its photos see, ascending.
         core_points, region_points: numbers of points in the core and in the region.
+        cameras: [V,3] origins of all the capture's photos; None where nothing is far.
+        reach: distance from the nearest of them beyond which content is far, world units.
     """
 
     core: Array
@@ -56,10 +62,23 @@ class Block:
     points: NDArray[np.int64]
     core_points: int
     region_points: int
+    cameras: Array | None = None
+    reach: float = float("inf")
 
     def contains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
-        """Mask [N] of positions [N,3] in the core."""
-        return inside_cell(self.core, positions)
+        """Mask [N] of positions [N,3] in the core and not far."""
+        return self._near(inside_cell(self.core, positions), positions)
+
+    def trains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """Mask [N] of positions [N,3] in the region and not far."""
+        return self._near(inside_cell(self.region, positions), positions)
+
+    def _near(self, mask: NDArray[np.bool_], positions: NDArray[np.floating]) -> NDArray[np.bool_]:
+        if self.cameras is not None:
+            rows = np.flatnonzero(mask)
+            distances = cKDTree(self.cameras).query(positions[rows])[0]
+            mask[rows] = distances < self.reach
+        return mask
 
     def describe(self) -> str:
         """Photos and points."""
@@ -85,24 +104,28 @@ def divide(dataset: Dataset, points: SparsePoints, count: int) -> tuple[Block, .
         )
     seen = visible_points(dataset.train, points)
     totals = np.asarray(seen.sum(axis=1)).ravel()
-    cores = partition(points.positions, count)
-    regions = [grown(core, points.positions) for core in cores]
+    weights = np.asarray(seen.T @ (1.0 / np.maximum(totals, 1))).ravel()
+    cores = partition(points.positions, count, weights)
+    regions = [grown(core, points.positions, weights) for core in cores]
     members = np.stack([inside_cell(region, points.positions) for region in regions])
     counts = np.stack([seen @ rows.astype(np.int32) for rows in members])
     chosen = (counts >= MIN_BLOCK_POINTS) & (counts >= MIN_PHOTO_SHARE * totals)
     most = counts.argmax(axis=0)
     chosen[most, np.arange(len(totals))] |= counts.max(axis=0) >= MIN_BLOCK_POINTS
+    origins = np.stack([view.camera.origin for view in dataset.train])
+    photos, rows = seen.nonzero()
+    reach = FAR_DEPTHS * float(np.median(np.linalg.norm(origins[photos] - points.positions[rows], axis=1)))
     blocks = []
     for number, (core, region, rows) in enumerate(zip(cores, regions, members, strict=True)):
-        photos = tuple(int(n) for n in np.flatnonzero(chosen[number]))
-        if len(photos) < 2:
+        own = tuple(int(n) for n in np.flatnonzero(chosen[number]))
+        if len(own) < 2:
             raise CagefieldError(
-                f"{dataset.path}: block {number + 1} of {count} is seen by {len(photos)} photos; give fewer "
+                f"{dataset.path}: block {number + 1} of {count} is seen by {len(own)} photos; give fewer "
                 "--blocks"
             )
-        shared = np.flatnonzero(np.asarray(seen[list(photos)].sum(axis=0)).ravel() >= 2)
+        shared = np.flatnonzero(np.asarray(seen[list(own)].sum(axis=0)).ravel() >= 2)
         inside = int(inside_cell(core, points.positions).sum())
-        blocks.append(Block(core, region, photos, shared, inside, int(rows.sum())))
+        blocks.append(Block(core, region, own, shared, inside, int(rows.sum()), origins, reach))
     return tuple(blocks)
 
 
@@ -112,28 +135,49 @@ def check_count(count: int) -> None:
         raise CagefieldError(f"blocks is {count}; give a number from 1 to {MAX_BLOCKS}")
 
 
-def partition(positions: Array, count: int) -> list[Array]:
-    """Half-open cells [2,3] that tile space, with about equal numbers of the points [M,3] in each.
+def partition(positions: Array, count: int, weights: Array | None = None) -> list[Array]:
+    """Half-open cells [2,3] that tile space, with about equal weights [M] of the points [M,3] in each.
 
-    A cell is divided across the axis along which its points spread most, 5th to 95th percentile.
+    A cell is divided across the axis along which its points spread most, 5th to 95th percentile. Points
+    without `weights` count equally.
     """
     whole = np.array([[-np.inf] * 3, [np.inf] * 3])
-    return _divided(whole, np.asarray(positions, np.float64), count)
+    weights = np.ones(len(positions)) if weights is None else weights
+    return _divided(whole, np.asarray(positions, np.float64), np.asarray(weights, np.float64), count)
 
 
-def _divided(cell: Array, positions: Array, count: int) -> list[Array]:
+def _divided(cell: Array, positions: Array, weights: Array, count: int) -> list[Array]:
     if count == 1:
         return [cell]
-    low, high = np.quantile(positions, (0.05, 0.95), axis=0)
+    low, high = _quantiles(positions, weights, (0.05, 0.95))
     axis = int(np.argmax(high - low))
     fewer = count // 2
-    rank = round(len(positions) * fewer / count)
-    around = np.sort(positions[:, axis])[max(rank - 1, 0) : rank + 1]
-    plane = float(around.mean())
+    plane = _dividing_plane(positions[:, axis], weights, fewer / count)
     left, right = cell.copy(), cell.copy()
     left[1, axis] = right[0, axis] = plane
     below = positions[:, axis] < plane
-    return _divided(left, positions[below], fewer) + _divided(right, positions[~below], count - fewer)
+    return _divided(left, positions[below], weights[below], fewer) + _divided(
+        right, positions[~below], weights[~below], count - fewer
+    )
+
+
+def _dividing_plane(values: Array, weights: Array, share: float) -> float:
+    """Midway between the neighboring values [M] below which nearest to this share of the weights lies."""
+    order = np.argsort(values, kind="stable")
+    sums = np.cumsum(weights[order])
+    rank = int(np.argmin(np.abs(sums[:-1] - share * sums[-1]))) + 1
+    return float(values[order][rank - 1 : rank + 1].mean())
+
+
+def _quantiles(positions: Array, weights: Array, shares: tuple[float, float]) -> Array:
+    """Two quantiles [2,3] of weighted positions [M,3]."""
+    bounds = np.empty((2, 3))
+    for axis in range(3):
+        order = np.argsort(positions[:, axis], kind="stable")
+        sums = np.cumsum(weights[order])
+        ranks = np.searchsorted(sums, np.array(shares) * sums[-1])
+        bounds[:, axis] = positions[order, axis][ranks.clip(0, len(positions) - 1)]
+    return bounds
 
 
 def inside_cell(cell: Array, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
@@ -142,12 +186,16 @@ def inside_cell(cell: Array, positions: NDArray[np.floating]) -> NDArray[np.bool
     return mask
 
 
-def grown(cell: Array, positions: Array) -> Array:
-    """Cell [2,3] whose inner planes are moved outwards by OVERLAP of its extent among the points [M,3]."""
-    inside = positions[inside_cell(cell, positions)]
-    bounds = np.stack([inside.min(axis=0), inside.max(axis=0)])
+def grown(cell: Array, positions: Array, weights: Array | None = None) -> Array:
+    """Cell [2,3] whose inner planes are moved outwards by OVERLAP of its extent.
+
+    On its infinite sides the cell extends to the outer quartile of its points [M,3], of these `weights` [M].
+    """
+    inside = inside_cell(cell, positions)
+    weights = np.ones(len(positions)) if weights is None else weights
+    bounds = _quantiles(positions[inside], weights[inside], (0.25, 0.75))
     extent = np.where(np.isfinite(cell), cell, bounds)
-    margin = OVERLAP * (extent[1] - extent[0])
+    margin = OVERLAP * np.abs(extent[1] - extent[0])
     return cell + np.stack([-margin, margin])
 
 
@@ -194,62 +242,25 @@ def left_out(dataset: Dataset, blocks: Sequence[Block]) -> tuple[str, ...]:
     return tuple(view.name for n, view in enumerate(dataset.train) if n not in used)
 
 
-def align_gains(
-    blocks: Sequence[Block], gains: Sequence[NDArray[np.float32]], photos: int
-) -> tuple[Array, NDArray[np.float32]]:
-    """(factor [B,3] of each block's colors, gain [photos,3] of each photo in the merged field).
+def merge(blocks: Sequence[Block], fields: Sequence[SplatField], scaffold: SplatField | None) -> SplatField:
+    """The field of all blocks: of each block's field the splats that it contains, of the scaffold the others.
 
-    Block b explains a shared photo p by gains g_bp that differ between blocks by the factors f_b alone:
-    log f minimizes the sum over blocks and photos of |log g_bp - log f_b - mean_c (log g_cp - log f_c)|^2.
-    The mean gain of all photos is 1; photos in no block have gain 1.
-    """
-    design, target = [], []
-    by_photo: dict[int, list[tuple[int, Array]]] = {}
-    for number, (block, values) in enumerate(zip(blocks, gains, strict=True)):
-        for photo, gain in zip(block.photos, np.log(values.astype(np.float64)), strict=True):
-            by_photo.setdefault(photo, []).append((number, gain))
-    for known in by_photo.values():
-        mean = np.mean([gain for _, gain in known], axis=0)
-        share = np.zeros(len(blocks))
-        for number, _ in known:
-            share[number] += 1.0 / len(known)
-        for number, gain in known:
-            row = -share
-            row[number] += 1.0
-            design.append(row)
-            target.append(gain - mean)
-    # Blocks without a common photo are related by no equation: the least norm keeps their factors.
-    factors = np.linalg.lstsq(np.array(design), np.array(target), rcond=1e-9)[0]
-    merged = np.ones((photos, 3))
-    for photo, known in by_photo.items():
-        merged[photo] = np.exp(np.mean([gain - factors[number] for number, gain in known], axis=0))
-    used = list(by_photo)
-    mean_gain = merged[used].mean(axis=0)
-    merged[used] /= mean_gain
-    return np.exp(factors) * mean_gain, merged.astype(np.float32)
-
-
-def merge(blocks: Sequence[Block], fields: Sequence[SplatField], factors: Array | None = None) -> SplatField:
-    """The field of all blocks: of each block's field the splats whose means lie in its core.
-
-    Colors are multiplied by the blocks' `factors` [B,3]. The fields agree in everything but their splats.
+    The fields agree in everything but their splats. Without a `scaffold`, that of one block is the field.
 
     Raises:
-        CagefieldError: no splat lies in its block's core.
+        CagefieldError: no block contains a splat of its field.
     """
-    kept = []
-    for number, (block, field) in enumerate(zip(blocks, fields, strict=True)):
-        part = field if len(blocks) == 1 else field.take(block.contains(field.means))
-        if factors is not None and not (factors[number] == 1.0).all():
-            gains = np.broadcast_to(factors[number], (len(part), 3))
-            part = replace(part, sh=scale_sh_colors(part.sh, gains))
-        kept.append(part)
-    if len(kept) == 1:
-        return kept[0]
+    if scaffold is None:
+        return fields[0]
+    kept = [field.take(block.contains(field.means)) for block, field in zip(blocks, fields, strict=True)]
     if not any(len(part) for part in kept):
         raise CagefieldError("the blocks have no splats in their cores; give fewer --blocks")
+    left = np.ones(len(scaffold), bool)
+    for block in blocks:
+        left &= ~block.contains(scaffold.means)
+    kept.append(scaffold.take(left))
     return replace(
-        fields[0],
+        scaffold,
         means=np.concatenate([part.means for part in kept]),
         log_scales=np.concatenate([part.log_scales for part in kept]),
         quaternions=np.concatenate([part.quaternions for part in kept]),

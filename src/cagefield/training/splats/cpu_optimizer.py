@@ -111,6 +111,8 @@ class CpuSplatOptimizer:
     def update(self, rule: StepArgs) -> None:
         """See `SplatOptimizer.update`."""
         state, visible = self.state, self._projected.order
+        if state.frozen.any():
+            visible = visible[~state.frozen[visible]]
         gauss_newton(
             visible,
             state.gradients,

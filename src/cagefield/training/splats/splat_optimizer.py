@@ -64,4 +64,4 @@ class SplatOptimizer(Protocol):
         """(gradient [6], curvature [6,6]) of the camera's motion; see `pose_optimization`."""
 
     def update(self, rule: StepArgs) -> None:
-        """Take a Gauss-Newton step of the visible splats, and count their errors and hits."""
+        """Take a Gauss-Newton step of the visible splats that are not frozen; count their errors and hits."""

@@ -41,6 +41,7 @@ from cagefield.training.splats.kernels.gauss_newton_splats import StepArgs
 from cagefield.training.splats.kernels.ssim import WINDOW_PIXELS
 from cagefield.training.splats.pose_optimization import POSE_START_PROGRESS, PoseRefinement
 from cagefield.training.splats.robust_weights import ROBUST_START_PROGRESS, RobustWeights
+from cagefield.training.splats.scaffold import Context
 from cagefield.training.splats.splat_config import CHECKPOINT_KEYS, SplatConfig
 from cagefield.training.splats.splat_optimizer import Photo, SplatOptimizer
 from cagefield.training.splats.splat_state import SplatState
@@ -100,8 +101,17 @@ def new_optimizer(state: SplatState, near: float, antialiased: bool) -> SplatOpt
 class SplatRun:
     """Training run of a SplatField; a `loop.Run`."""
 
-    def __init__(self, dataset: Dataset, config: SplatConfig, seeds: InitialSplats | None = None) -> None:
-        """State at the start; `seeds` are initial splats, None for `initialize_splats`."""
+    def __init__(
+        self,
+        dataset: Dataset,
+        config: SplatConfig,
+        seeds: InitialSplats | None = None,
+        context: Context | None = None,
+    ) -> None:
+        """State at the start; `seeds` are initial splats, None for `initialize_splats`.
+
+        `context` has the frozen splats and the photos' gains of a block's training.
+        """
         self._config, self._dataset = config, dataset
         self.views = load_views(dataset.train)
         self._rng = np.random.default_rng(config.seed)
@@ -109,6 +119,8 @@ class SplatRun:
         self._near = near_depth(dataset.bounds)
         self._max_splats = max_splats([view.cameras[0] for view in self.views], config)
         state, self.free_distances = seeds or initialize_splats(dataset, self.views, config, self._max_splats)
+        if context is not None:
+            state = context.joined(state)
         self._optimizer = new_optimizer(state, self._near, config.antialiased)
         self._depths = depth_ranges([view.cameras[0] for view in self.views], state.means)
         self._free_space = FreeSpace(
@@ -120,6 +132,8 @@ class SplatRun:
         self.background = np.full(3, 1.0 if dataset.white_background else 0.0, np.float32)
         self._fits_exposure = (not alpha) if config.exposure is None else config.exposure
         self.gains = np.ones((len(self.views), 3), np.float32)
+        if context is not None:
+            self._fits_exposure, self.gains = False, np.array(context.gains, np.float32)
         sizes = [(view.cameras[0].width, view.cameras[0].height) for view in self.views]
         self._robust = (
             RobustWeights([(-(-h // TILE_PX), -(-w // TILE_PX)) for w, h in sizes]) if config.robust else None
@@ -242,23 +256,26 @@ class SplatRun:
         for view, depth in zip(self.views, self._depths, strict=True):
             if depth is not None:
                 close |= closer_mask(view.cameras[0], state.means, OBSTRUCTION_DEPTH_SHARE * depth[0])
+        close &= ~state.frozen
         if close.any() and not close.all():
             state.take(np.flatnonzero(~close))
 
     def _densify(self, done: float) -> None:
         """Prune splats without effect, and split those with the largest error."""
         state, config = self.state, self._config
-        keep = np.flatnonzero(~prune_mask(state, config.prune_opacity, 20.0 * self._scale))
+        pruned = prune_mask(state, config.prune_opacity, 20.0 * self._scale) & ~state.frozen
+        keep = np.flatnonzero(~pruned)
         state.take(keep if len(keep) else np.arange(1))
+        count = len(state) - int(state.frozen.sum())
         rounds = max(
             1.0,
             (DENSIFICATION_PROGRESS[1] - done)
             / max(done / max(self.step, 1), 1e-9)
             / DENSIFICATION_INTERVAL_STEPS,
         )
-        if len(state) < self._max_splats:
-            want = int(len(state) * ((self._max_splats / len(state)) ** (1.0 / rounds) - 1.0))
-            want = min(want, len(state) // 2, self._max_splats - len(state))
+        if 0 < count < self._max_splats:
+            want = int(count * ((self._max_splats / count) ** (1.0 / rounds) - 1.0))
+            want = min(want, count // 2, self._max_splats - count)
             rows = np.argsort(-state.error)[:want]
             split_splats(state, rows[state.error[rows] > 0])
         state.error[:] = 0.0
@@ -269,8 +286,11 @@ class SplatRun:
         return tuple(self.poses.camera(n, view.cameras[0]) for n, view in enumerate(self.views))
 
     def field(self) -> SplatField:
-        """Current field, without needles."""
-        field = self.state.to_field(self._config.antialiased, self._dataset.bounds, self._dataset.unbounded)
+        """Current field, without needles and frozen splats."""
+        state = self.state
+        field = state.to_field(self._config.antialiased, self._dataset.bounds, self._dataset.unbounded)
+        if state.frozen.any():
+            field = field.take(~state.frozen)
         thin = needle_mask(field.log_scales)
         return field if thin.all() else field.take(~thin)
 

@@ -20,7 +20,8 @@ class SplatState:
 
     means [N,3], log_scales [N,3], quaternions [N,4], logits [N] of the opacities, sh [N,K,3]: as in
     SplatField.
-    momentum, running, ticks: state of `gauss_newton`. error [N], hits [N]: error and visits since the last
+    momentum, running, ticks: state of `gauss_newton`; ticks below 0 mark frozen splats, which take no step.
+    error [N], hits [N]: error and visits since the last
     densification. gradients, curvatures: of the last step, valid for the splats visible in it.
     """
 
@@ -56,8 +57,31 @@ class SplatState:
             *_empty_optimizer_rows(n),
         )
 
+    @classmethod
+    def frozen_from(cls, field: SplatField, terms: int) -> SplatState:
+        """Frozen splats of a field, with `terms` harmonics."""
+        n, known = len(field), min(terms, field.sh.shape[1])
+        opacities = np.clip(np.asarray(field.opacities, np.float64), 1e-4, 1.0 - 1e-4)
+        sh = np.zeros((n, terms, 3), np.float32)
+        sh[:, :known] = field.sh[:, :known]
+        state = cls(
+            np.array(field.means, np.float32),
+            np.array(field.log_scales, np.float32),
+            np.array(field.quaternions, np.float32),
+            np.log(opacities / (1.0 - opacities)).astype(np.float32),
+            sh,
+            *_empty_optimizer_rows(n),
+        )
+        state.ticks[:] = -1
+        return state
+
     def __len__(self) -> int:
         return len(self.means)
+
+    @property
+    def frozen(self) -> NDArray[np.bool_]:
+        """Mask [N] of frozen splats."""
+        return self.ticks < 0
 
     def parameter_args(self) -> ParameterArgs:
         """Parameters as kernel arguments."""

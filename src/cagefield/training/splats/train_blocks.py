@@ -1,8 +1,10 @@
 """Training of a capture in blocks, one after another or on a cluster, into one SplatField.
 
-A folder keeps the finished blocks, `block-0001.safetensors` with `block-0001.json`, and the checkpoint of
-the block in training, so that a training goes on where it stopped. One block is in memory at a time. Each
-gets as many steps and splats for each of its photos as a training of the whole capture would.
+First the scaffold is trained (`scaffold`), on all photos at a reduced size, then each block with the
+scaffold's splats around it. A folder keeps the finished ones, `block-0001.safetensors` with
+`block-0001.json`, and the checkpoint of the block in training, so that a training goes on where it stopped.
+One block is in memory at a time. Each gets as many steps and splats for each of its photos as a training of
+the whole capture would.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ import dataclasses
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,13 +29,12 @@ from cagefield.files.atomic import replaced_file
 from cagefield.files.safe_open import UnreadableError, open_regular
 from cagefield.training.evaluation import evaluate_views
 from cagefield.training.result import TrainResult
-from cagefield.training.splats.blocks import Block, align_gains, block_dataset, divide, merge
+from cagefield.training.splats.blocks import Block, block_dataset, divide, merge
+from cagefield.training.splats.scaffold import MIN_SPLATS, Context, scaffold_config, scaffold_dataset
 from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.training.splats.train_splats import train_splat
 
 OnStage = Callable[[str, float, str], None]
-MIN_SPLATS = 100
-"""Minimum of a block's maximum number of splats."""
 _MAX_RECORD_BYTES = 1 << 22
 
 
@@ -41,7 +42,8 @@ _MAX_RECORD_BYTES = 1 << 22
 class BlockJob:
     """One block's training: photos and points, options with its own steps, and the files it writes.
 
-    `key` is a digest of everything that the result depends on.
+    `key` is a digest of everything that the result depends on. The training of the scaffold has number -1
+    and no `block`; without a `scaffold` the block is the whole capture.
     """
 
     number: int
@@ -49,15 +51,34 @@ class BlockJob:
     config: SplatConfig
     folder: Path
     key: str
+    block: Block | None = None
+    scaffold: BlockJob | None = None
 
     @property
     def name(self) -> str:
         """Name of the block in messages, from 1."""
-        return f"block {self.number + 1}"
+        return "scaffold" if self.number < 0 else f"block {self.number + 1}"
 
     def path(self, suffix: str) -> Path:
         """A file of the block in the folder."""
-        return self.folder / f"block-{self.number + 1:04d}{suffix}"
+        stem = "scaffold" if self.number < 0 else f"block-{self.number + 1:04d}"
+        return self.folder / f"{stem}{suffix}"
+
+    def context(self) -> Context | None:
+        """Surroundings from the finished scaffold; None without one.
+
+        Raises:
+            CagefieldError: the scaffold is not finished, damaged, or of another training.
+        """
+        if self.scaffold is None or self.block is None:
+            return None
+        coarse = read_block(self.scaffold)
+        if coarse is None:
+            raise CagefieldError(
+                f"{self.scaffold.path('.safetensors')} is not there; the folder must be shared"
+            )
+        cameras = [view.camera for view in self.dataset.train]
+        return Context.around(self.block, coarse.field, coarse.gains[list(self.block.photos)], cameras)
 
 
 @dataclass(frozen=True)
@@ -102,17 +123,23 @@ def plan_blocks(
             raise CagefieldError(f"{dataset.path}: without points there are no blocks; leave out --blocks")
         points = SparsePoints(np.zeros((0, 3)), np.zeros((0, 3), np.uint8))
     blocks = divide(dataset, points, count)
-    jobs = []
+    jobs, scaffold = [], None
+    if count > 1:
+        whole = replace(scaffold_dataset(dataset), points=points)
+        coarse = scaffold_config(config)
+        scaffold = BlockJob(-1, whole, coarse, folder, _key(None, coarse, whole))
+        config = replace(config, background_share=0.0)
     for number, block in enumerate(blocks):
         share = len(block.photos) / len(dataset.train)
-        part = dataclasses.replace(
+        part = replace(
             config,
             steps=max(1, round(config.steps * share)),
             minutes=None if config.minutes is None else config.minutes * share,
             splats=None if config.splats is None else max(MIN_SPLATS, round(config.splats * share)),
         )
         photos = block_dataset(dataset, points, block)
-        jobs.append(BlockJob(number, photos, part, folder, _key(block, part, dataset)))
+        key = _key(block, part, dataset, "" if scaffold is None else scaffold.key)
+        jobs.append(BlockJob(number, photos, part, folder, key, block, scaffold))
     return blocks, tuple(jobs)
 
 
@@ -128,28 +155,27 @@ def train_blocks(
     """The merged field of all blocks, with PSNR and SSIM on the test views.
 
     Finished blocks in the jobs' folder are taken from there. `trainer` trains the others, None one after
-    another. `finished` is False, and the field that of the finished blocks, where Ctrl-C ended it early.
+    another. `finished` is False where Ctrl-C ended it early; the scaffold's splats then stand for the blocks
+    that are not finished.
 
     Raises:
         CagefieldError: no block is finished; files in the folder of another training.
     """
-    found = {job.number: done for job in jobs if (done := read_block(job)) is not None}
-    missing = [job for job in jobs if job.number not in found]
     run = trainer or (lambda jobs: _one_by_one(jobs, on_stage))
-    for job in run(missing) if missing else ():
-        done = read_block(job)
-        if done is None:
-            raise CagefieldError(f"{job.path('.safetensors')} is not there; the folder must be shared")
-        found[job.number] = done
+    scaffold = jobs[0].scaffold
+    coarse = None if scaffold is None else _finished([scaffold], run).get(-1)
+    found = _finished(jobs, run) if scaffold is None or coarse is not None else {}
     if not found:
         raise CagefieldError("no block is finished; the same command with --resume continues")
     there = [blocks[number] for number in sorted(found)]
     results = [found[number] for number in sorted(found)]
-    factors, gains = align_gains(there, [result.gains for result in results], len(dataset.train))
-    field = merge(there, [result.field for result in results], factors if len(there) > 1 else None)
-    if len(there) == 1:
+    field = merge(there, [result.field for result in results], None if coarse is None else coarse.field)
+    if coarse is None:
         gains = np.ones((len(dataset.train), 3), np.float32)
         gains[list(there[0].photos)] = results[0].gains
+    else:
+        gains = coarse.gains
+        results.append(coarse)
     some = dataset.train[:: max(1, len(dataset.train) // 10)] if evaluate else ()
     return TrainResult(
         field,
@@ -163,6 +189,20 @@ def train_blocks(
     )
 
 
+def _finished(
+    jobs: Sequence[BlockJob], run: Callable[[Sequence[BlockJob]], Iterable[BlockJob]]
+) -> dict[int, TrainedBlock]:
+    """Finished blocks by number, after `run` has trained those that are not there."""
+    found = {job.number: done for job in jobs if (done := read_block(job)) is not None}
+    missing = [job for job in jobs if job.number not in found]
+    for job in run(missing) if missing else ():
+        done = read_block(job)
+        if done is None:
+            raise CagefieldError(f"{job.path('.safetensors')} is not there; the folder must be shared")
+        found[job.number] = done
+    return found
+
+
 def train_block(job: BlockJob, on_stage: OnStage | None = None) -> bool:
     """Trains a block into its files, from its checkpoint if there is one; False where Ctrl-C ended it."""
     job.folder.mkdir(parents=True, exist_ok=True)
@@ -172,6 +212,7 @@ def train_block(job: BlockJob, on_stage: OnStage | None = None) -> bool:
     result = train_splat(
         job.dataset,
         job.config,
+        context=job.context(),
         checkpoint=checkpoint,
         resume=checkpoint.is_file(),
         on_progress=lambda progress: move(stage, getattr(progress, "done", 0.0), str(progress)),
@@ -231,7 +272,9 @@ def _one_by_one(jobs: Sequence[BlockJob], on_stage: OnStage | None) -> Iterator[
         yield job
 
 
-def _key(block: Block, config: SplatConfig, dataset: Dataset) -> str:
-    names = [[dataset.train[n].name, dataset.train[n].camera.to_dict()] for n in block.photos]
-    content = json.dumps([block.core.tolist(), dataclasses.asdict(config), names], default=str)
+def _key(block: Block | None, config: SplatConfig, dataset: Dataset, scaffold: str = "") -> str:
+    views = dataset.train if block is None else [dataset.train[n] for n in block.photos]
+    names = [[view.name, view.camera.to_dict()] for view in views]
+    core = None if block is None else block.core.tolist()
+    content = json.dumps([core, dataclasses.asdict(config), names, scaffold], default=str)
     return hashlib.sha256(content.encode()).hexdigest()

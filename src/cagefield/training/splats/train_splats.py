@@ -28,6 +28,7 @@ from cagefield.training.splats.splat_config import SplatConfig
 
 if TYPE_CHECKING:
     from cagefield.training.splats.initialization import InitialSplats
+    from cagefield.training.splats.scaffold import Context
 
 
 def train_splat(
@@ -35,6 +36,7 @@ def train_splat(
     config: SplatConfig | None = None,
     *,
     seeds: InitialSplats | None = None,
+    context: Context | None = None,
     checkpoint: Path | str | None = None,
     resume: bool = False,
     on_progress: Callable[[object], None] | None = None,
@@ -44,10 +46,11 @@ def train_splat(
     """SplatField trained on the data set's photos, with PSNR and SSIM on its test views.
 
     A capture without points first gets points from its poses (`starting_points`), which are cached; then the
-    photos' surfaces are swept. `seeds` replace both. `on_stage` gets a stage's name, its progress, and a
-    note. With `checkpoint`, the state of the run is written every minute and at the end, which Ctrl-C brings
-    early (`finished` is then False); `resume` continues the checkpoint, on the same device or another. On a
-    CPU a resumed run of given `steps` ends in the field of an uninterrupted one.
+    photos' surfaces are swept. `seeds` replace both. `context` surrounds a block of a capture. `on_stage`
+    gets a stage's name, its progress, and a note. With `checkpoint`, the state of the run is written every
+    minute and at the end, which Ctrl-C brings early (`finished` is then False); `resume` continues the
+    checkpoint, on the same device or another. On a CPU a resumed run of given `steps` ends in the field of an
+    uninterrupted one.
 
     Raises:
         DatasetError: no photos, or unreadable photos.
@@ -64,7 +67,7 @@ def train_splat(
         )
     if seeds is None:
         report("Finding surfaces", 0.0, "")
-    run = SplatRun(dataclasses.replace(dataset, points=points), config, seeds)
+    run = SplatRun(dataclasses.replace(dataset, points=points), config, seeds, context)
     finished = run_to_end(run, checkpoint=checkpoint, resume=resume, on_progress=on_progress)
     field = run.field()
     train, test = Evaluation(), Evaluation()

@@ -78,10 +78,13 @@ def gauss_newton(
     count: qd.i32,
     K: qd.template(),
 ):
-    """Take one step of the splats with tiles in `boxes` [N,4], K harmonics each; add to errors and hits."""
+    """Take one step of the splats with tiles in `boxes` [N,4], K harmonics each; add to errors and hits.
+
+    Frozen splats, of ticks below 0, stay.
+    """
     qd.loop_config(block_dim=128)
     for i in range(count):
-        if boxes[4 * i + 1] > boxes[4 * i]:
+        if boxes[4 * i + 1] > boxes[4 * i] and averages.ticks[i] >= 0:
             first = GRADIENT_FLOATS * i
             ticks = averages.ticks[i] + 1
             averages.ticks[i] = ticks
