@@ -183,7 +183,7 @@ def test_discs_are_refused_and_large_pages_warned_of(
     line = refused(capsys, "export", tmp_path / "discs", "-o", tmp_path / "x.html")
     assert "are discs (2DGS)" in line and not (tmp_path / "x.html").exists()
     scene.save(tmp_path / "splats")
-    monkeypatch.setattr("cagefield.cli.export.LARGE_PAGE_BYTES", 1e3)
+    monkeypatch.setattr("cagefield.cli.export_page.LARGE_PAGE_BYTES", 1e3)
     assert main(["export", str(tmp_path / "splats"), "-o", str(tmp_path / "x.html")]) == 0
     assert "more than the 0 that most sites and phones take well" in capsys.readouterr().err
 

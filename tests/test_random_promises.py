@@ -15,6 +15,7 @@ from benchmarks.edits.random_promises import (
     possible_edit,
     read_log,
     run,
+    surface_points,
     table,
     tasks,
 )
@@ -23,7 +24,7 @@ from cagefield.edits import Edit, Trilinear
 from cagefield.edits.edit import Continuous
 from cagefield.geometry.cage import Cage
 
-GOOD = Promises("box", 0, 0, 1, 0.5, 0.0, 1e-9, 1e-8)
+GOOD = Promises("box", 0, 0, 1, 0.5, 0.0, 1e-9, 1e-8, 1e-4)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -54,19 +55,30 @@ def test_a_fold_is_measured() -> None:
         (0, 0, 2.5)
     )
     assert isinstance(folded, Continuous)
-    least, *_, trip = measure(folded, 400, 0)
+    least, _, _, trip, _ = measure(folded, 400, 0)
     assert least <= 0.0 and trip > 1e-4
-    assert Promises("box", 0, 0, 0, least, 0.0, 0.0, trip).failures == ("least det J", "round trip")
+    broken = Promises("box", 0, 0, 0, least, 0.0, 0.0, trip, 0.0).failures
+    assert broken == ("least det J", "round trip")
+
+
+def test_a_jump_at_the_inner_surface_is_measured() -> None:
+    inner = Cage.box((0, 0, 0), 0.6)
+    shell = Edit.continuous(inner, inner.grown(0.4)).translate((0.2, 0.0, 0.0))
+    assert isinstance(shell, Continuous)
+    assert measure(shell, 50, 0)[4] < 1e-6
+    surface = surface_points(shell.deformed, 50, np.random.default_rng(0))
+    assert np.abs(np.abs(surface - (0.2, 0.0, 0.0)).max(axis=1) - 0.3).max() < 1e-12
+    assert replace(GOOD, kind="mesh").failures == ("continuity",)
 
 
 def test_broken_promises_are_named_nan_among_them_and_counted_by_kind() -> None:
     nan = float("nan")
-    moved = Promises("mesh", 0, 0, 0, 0.2, 2e-6, 0.0, nan)
-    rim = Promises("mesh", 1, 1, 0, nan, 0.0, 2e-6, 0.0)
+    moved = Promises("mesh", 0, 0, 0, 0.2, 2e-6, 0.0, nan, 0.0)
+    rim = Promises("mesh", 1, 1, 0, nan, 0.0, 2e-6, 0.0, 0.0)
     assert GOOD.failures == ()
     assert moved.failures == ("outside", "round trip") and rim.failures == ("least det J", "outer faces")
     text = table([GOOD, moved, rim], 12, "command").markdown()
-    assert "| box | 1 | 50.0% | 5.0e-01 | 0.50 | 0.0e+00 | 1.0e-09 | 1.0e-08 | 0 |" in text
+    assert "| box | 1 | 50.0% | 5.0e-01 | 0.50 | 0.0e+00 | 1.0e-09 | 1.0e-08 | 1.0e-04 | 0 |" in text
     assert text.count("| mesh | 2 |") == 1 and "outer faces 1" in text and "`command`" in text
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -17,7 +16,6 @@ from cagefield.cli.options import (
     SpzVersion,
     Up,
     check_file,
-    check_folder,
     progress_bar,
     stages,
 )
@@ -27,14 +25,10 @@ from cagefield.files.safe_open import real_path
 if TYPE_CHECKING:
     from cagefield.fields.splat_field import SplatField
     from cagefield.geometry.cage import Cage
-    from cagefield.pages.path_states import PathEdits
     from cagefield.scene.scene import Scene
     from cagefield.typing import Array
 
 What = Literal["splats", "mesh", "points", "page"]
-
-LARGE_PAGE_BYTES = 25e6
-"""Bytes of a page from which on a line warns."""
 
 
 @dataclass(frozen=True)
@@ -115,12 +109,8 @@ class Export:
         print(f"{write(scene, cages)}\nwritten to {self.out}")
 
     def _page(self) -> None:
-        """Write a page, and print its contents."""
-        from cagefield.cameras.keyframe_files import load_keys
-        from cagefield.compute import devices
-        from cagefield.files.atomic import replaced_file
-        from cagefield.pages.scene_page import INDEX, SCRIPT, ScenePage, write_folder
-        from cagefield.scene.scene import Scene
+        """Check the options of a page, and write it."""
+        from cagefield.cli.export_page import export_page
 
         if self.what not in ("splats", "page"):
             raise CagefieldError(f"{self.out}: {self.what} are not written as a page; give another name")
@@ -138,54 +128,14 @@ class Export:
             )
         if self.embed and self.out.suffix.lower() == ".html":
             raise CagefieldError(f"{self.out}: --embed writes a folder; give a name without .html")
-        if self.embed:
-            check_folder(self.out, self.overwrite, SCRIPT)
-        else:
-            check_file(self.out, self.overwrite)
-        scene = Scene.open(self.scene)
-        devices.start(self.device)
-        path = self.scene / "camera_path.json"
-        keys, loop = load_keys(path) if path.exists() else ((), False)
-        with progress_bar("Levels of detail" if self.levels else "Edits along the path") as move:
-            page = ScenePage.build(
-                scene,
-                real_path(self.scene).name,
-                keys,
-                loop=loop,
-                levels=self.levels,
-                on_progress=lambda done: move(done, 1.0, ""),
-            )
-        if self.embed:
-            written = page.folder()
-            write_folder(self.out, written)
-            size = sum(map(len, written.values()))
-        else:
-            text = page.one_file()
-            size = len(text)
-            with replaced_file(self.out, parents=False) as draft:
-                draft.write_text(text, encoding="utf-8")
-        edits = len(scene.edits.active)
-        shown = f"{edits} edit{'s' * (edits != 1)}, " if edits else "no edits, "
-        way = f"a camera path of {len(keys)} keys" if len(keys) > 1 else "no camera path"
-        print(f"a page of {size / 1e6:.1f} MB: {shown}{way}")
-        if page.nodes:
-            first = size - sum(map(len, page.nodes.values()))
-            print(
-                f"levels of detail: {first / 1e6:.1f} MB until the first picture, {len(page.nodes)} nodes; "
-                "edits baked in"
-            )
-        if size > LARGE_PAGE_BYTES and not page.nodes:
-            warnings.warn(
-                f"the page has {size / 1e6:.0f} MB, more than the {LARGE_PAGE_BYTES / 1e6:.0f} that most "
-                "sites and phones take well; a smaller field, or fewer splats, make a smaller one",
-                stacklevel=2,
-            )
-        if page.along is not None:
-            print(_along(page.along, scene))
-        print(f"written to {self.out}")
-        if self.embed:
-            name = real_path(self.out).name
-            print(f'<iframe src="{name}/{INDEX}" width="800" height="600" style="border: 0"></iframe>')
+        export_page(
+            self.scene,
+            self.out,
+            self.device,
+            embed=self.embed,
+            levels=self.levels,
+            overwrite=self.overwrite,
+        )
 
     def _sequence(self) -> None:
         """Write a file of splats for each frame, and print how many."""
@@ -404,23 +354,4 @@ def _pastes(scene: Scene) -> bool:
 
     return isinstance(scene.field, SplatField) and any(
         isinstance(edit, Paste) and edit.enabled for edit in scene.edits
-    )
-
-
-def _along(along: PathEdits, scene: Scene) -> str:
-    """A line of figures of the edits along the path."""
-    states = f"edits along the path: {along.states} states, "
-    size = f"{len(along.data) / 1e6:.1f} MB; between two states "
-    if along.nodes is None:
-        whole = "" if along.split else "; on the way none is split where an edit bends or cuts it"
-        extent = 2.0 * float(scene.field.half_size.max())
-        mean, most = (100.0 * error / extent for error in along.error)
-        return (
-            f"{states}{size}splats are {mean:.2g}% of the scene's size beside the edits of that moment "
-            f"in the mean, {most:.2g}% for 99% of them{whole}"
-        )
-    mean, most = (error / scene.field.sample_spacing for error in along.error)
-    return (
-        f"{states}lattices of {along.nodes}^3 nodes, {size}they are {mean:.2g} voxels beside the edits of "
-        f"that moment in the mean, {most:.2g} at 99% of the points"
     )

@@ -9,13 +9,45 @@ import sys
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, TypeVar
 
 from cagefield.errors import CagefieldError, line_of
 from cagefield.files.safe_open import real_path
 
 if TYPE_CHECKING:
-    from cagefield.cli.train import Train
+    from cagefield.cli.options import Device
+    from cagefield.cli.photo_options import Captures
+
+
+class Training(Protocol):
+    """A training of one capture, or of several in turn, as the command line describes it."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def photos(self) -> Captures: ...
+    @property
+    def out(self) -> Path: ...
+    @property
+    def resume(self) -> bool: ...
+    @property
+    def cluster(self) -> str | None: ...
+    @property
+    def cluster_tls(self) -> tuple[Path, Path, Path] | None: ...
+    @property
+    def device(self) -> Device: ...
+
+    def run(self) -> None:
+        """Train and save."""
+
+    def checkpoint(self) -> Path:
+        """File of an interrupted training."""
+
+    def check_target(self) -> Path:
+        """Folder of the scene, once nothing is in its way."""
+
+
+AnyTraining = TypeVar("AnyTraining", bound=Training)
 
 
 class Outcome(NamedTuple):
@@ -26,7 +58,7 @@ class Outcome(NamedTuple):
     error: str = ""
 
 
-def train_captures(command: Train) -> None:
+def train_captures(command: Training) -> None:
     """Trains each capture of `command` into a folder of `command.out`; failures are named at the end.
 
     Raises:
@@ -48,11 +80,12 @@ def train_captures(command: Train) -> None:
         named = "; ".join(f"{name}: {error}" for name, error in failures.items())
         total = len(trainings)
         raise CagefieldError(
-            f"{len(failures)} of the {total} captures failed; the same command with --resume trains them ({named})"
+            f"{len(failures)} of the {total} captures failed; the same command with --resume trains them"
+            f" ({named})"
         )
 
 
-def plan_captures(command: Train) -> dict[str, Train]:
+def plan_captures(command: AnyTraining) -> dict[str, AnyTraining]:
     """The training of each capture by its name; with --resume, of those that are not finished.
 
     Raises:
@@ -63,7 +96,7 @@ def plan_captures(command: Train) -> dict[str, Train]:
     out = real_path(command.out)
     if is_scene(out):
         raise CagefieldError(f"{command.out} is a scene; give a folder for the scenes of several captures")
-    trainings: dict[str, Train] = {}
+    trainings: dict[str, AnyTraining] = {}
     for data in (command.photos.data, *command.photos.more):
         name = capture_name(data)
         if name in trainings:
@@ -93,7 +126,7 @@ def capture_name(data: Path) -> str:
     return path.stem if path.is_file() else path.name
 
 
-def train_capture(training: Train) -> Outcome:
+def train_capture(training: Training) -> Outcome:
     """One training, run to its end; its lines on standard output are its figures."""
     printed = io.StringIO()
     with warnings.catch_warnings(record=True) as caught, contextlib.redirect_stdout(printed):
@@ -110,7 +143,7 @@ def train_capture(training: Train) -> Outcome:
 
 
 def _outcomes(
-    command: Train, trainings: dict[str, Train], failures: dict[str, str]
+    command: Training, trainings: dict[str, AnyTraining], failures: dict[str, str]
 ) -> Iterator[tuple[str, Outcome]]:
     """Name and outcome of each training; trainings whose workers were lost are put into `failures`."""
     if command.cluster is None:

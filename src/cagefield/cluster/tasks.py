@@ -65,7 +65,7 @@ def results_of(
 ) -> Iterator[tuple[str, Any]]:
     """Name and result of each future, in the order in which they are complete; `futures` is emptied.
 
-    Those that are not done are cancelled when the iteration ends early. Messages begin with `kind` and the
+    Unfinished tasks are cancelled when the iteration ends early. Messages begin with `kind` and the
     name. Raises CagefieldError for lost workers, unless `failures` takes the message, and for a lost
     connection.
     """

@@ -19,7 +19,7 @@ def check_writable(path: Path, *, inside: bool = False) -> None:
     """Passes where a file or a folder may be made or replaced at `path`; its folder need not be there yet.
 
     With `inside` it is a folder, and files may be made in it. Raises OSError, that names `path`, where not:
-    called before work whose result has to go there. What ended programs left there is removed.
+    called before work whose result has to go there. Unfinished files of ended programs are removed.
     """
     path = path.absolute()
     folders = (path, *path.parents) if inside else path.parents

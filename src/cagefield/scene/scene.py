@@ -370,7 +370,7 @@ class Scene:
     def lattice_errors(self) -> tuple[LatticeError, ...]:
         """Errors of the edits' lattices against their exact maps, in units of `field.sample_spacing`.
 
-        That is a voxel's smallest edge, in the middle of the box of interest where the field is unbounded, or
+        It is a voxel's smallest edge, in the middle of the box of interest where the field is unbounded, or
         the width of most splats.
         """
         edits = EditStack(self.patcher.with_detours(self.edits.edits))

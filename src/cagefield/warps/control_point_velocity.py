@@ -41,7 +41,7 @@ from cagefield.warps.cage_maps import flow_between, inner_map_between, reach_bet
 from cagefield.warps.control_point_motion import DISTANCE_POWER, ControlPointMotion
 from cagefield.warps.falloff import Falloff
 from cagefield.warps.falloff_curves import STEEPEST, curve, curve_number
-from cagefield.warps.free_form import BOUND_TIMES, FreeFormFlow
+from cagefield.warps.free_form import BOUND_TIMES, EXACT_STEP_STRAIN, KINKED_STEP_STRAIN, FreeFormFlow
 from cagefield.warps.interfaces import InnerMap, NoInnerMap, Shell
 from cagefield.warps.outer_planes import OuterPlanes
 
@@ -238,7 +238,8 @@ def _larger(values: Array) -> Array:
 @flow_between.register
 def _(inner: ControlPoints, deformed: Cage, outer: Cage, falloff: Falloff) -> Shell:
     assert isinstance(deformed, ControlPoints)
-    return FreeFormFlow(ControlPointVelocity(inner, deformed, outer), outer)
+    strain = KINKED_STEP_STRAIN if inner.falloff == "linear" else EXACT_STEP_STRAIN
+    return FreeFormFlow(ControlPointVelocity(inner, deformed, outer), outer, strain)
 
 
 @inner_map_between.register

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -101,13 +102,15 @@ class LatticeFlow:
 
     def _slices(self, piece: Piece) -> tuple[Float32, float]:
         """(velocities [K,G,G,G,3] of a piece, most h |dv/dz|), in as many steps as it takes."""
-        # As few steps as there may be tell how many it takes.
-        steps, strain = 0, 0.0
-        while steps == 0 or (strain > steps * ENOUGH_STRAIN and steps < MOST_STEPS):
-            steps = int(np.clip(np.ceil(1.05 * strain / STEP_STRAIN), LEAST_STEPS, MOST_STEPS))
-            slices = np.stack([self._slice(piece, (k + 0.5) / steps) for k in range(steps)])
-            strain = max(slope_bound(part) for part in slices)
-        return slices, strain / steps
+
+        def slice_at(k: int, steps: int) -> Float32:
+            return self._slice(piece, (k + 0.5) / steps)
+
+        def steps_for(bound: float) -> int:
+            return int(np.clip(np.ceil(1.05 * bound / STEP_STRAIN), LEAST_STEPS, MOST_STEPS))
+
+        slices, bound = slices_in_steps(slice_at, steps_for, LEAST_STEPS, MOST_STEPS)
+        return slices, bound / len(slices)
 
     def _slice(self, piece: Piece, s: float) -> Float32:
         """The velocity [G,G,G,3] at time s of a piece."""
@@ -115,9 +118,8 @@ class LatticeFlow:
 
         places, reach, dz, margin = self._nodes
         frame, samples, blur = sampled(piece, s)
-        y_a, y_b = piece.local
-        nets = (y_a + s * (y_b - y_a), y_b - y_a)
-        P = np.stack([bspline_lattice.padded(net, piece.shape) for net in nets])
+        start, change = piece.padded
+        P = np.stack([start + s * change, change])
         n = self.cells + 1
         out = np.empty((n, n, n, 3), dtype=np.float32)
         linear = piece.interpolation == "linear"
@@ -125,18 +127,44 @@ class LatticeFlow:
         fill_slice(places, reach, dz, frame, samples, P, linear, settings, out.reshape(-1, 3))
         return out
 
-    @cached_property
+    @property
     def _nodes(self) -> tuple[Array, Array, Array, float]:
-        """(places [N,3], 1 / d_o [N], -1 on faces, dz/dx [N or 1,3,3], margin) of the grid's nodes."""
-        z = 2.0 * bspline_lattice.grid(3 * (self.cells + 1,)) - 1.0
-        places = hexahedron.points(self.outer.corners, 0.5 * (z + 1.0))
-        reach = 1.0 / outer_distance(self.confines, z)
-        reach[np.abs(z).max(axis=1) >= 1.0] = -1.0
-        margin = MARGIN * float(np.linalg.norm(self.confines.frame, axis=0).max()) * 2.0 / self.cells
-        if self.confines.is_affine:
-            return places, reach, self.confines.inverse[None], margin
-        slope = hexahedron.jacobian(self.outer.corners, 0.5 * (z + 1.0))
-        return places, reach, 2.0 * hexahedron.invert(slope), margin
+        return _nodes(self.outer, self.cells)
+
+
+@lru_cache(maxsize=8)
+def _nodes(outer: Cage, cells: int) -> tuple[Array, Array, Array, float]:
+    """(places [N,3], 1 / d_o [N], -1 on faces, dz/dx [N or 1,3,3], margin) of the nodes of a flow's grid."""
+    confines = Extended.from_cage(outer)
+    z = 2.0 * bspline_lattice.grid(3 * (cells + 1,)) - 1.0
+    places = hexahedron.points(outer.corners, 0.5 * (z + 1.0))
+    reach = 1.0 / outer_distance(confines, z)
+    reach[np.abs(z).max(axis=1) >= 1.0] = -1.0
+    margin = MARGIN * float(np.linalg.norm(confines.frame, axis=0).max()) * 2.0 / cells
+    if confines.is_affine:
+        return places, reach, confines.inverse[None], margin
+    slope = hexahedron.jacobian(outer.corners, 0.5 * (z + 1.0))
+    return places, reach, 2.0 * hexahedron.invert(slope), margin
+
+
+def slices_in_steps(
+    slice_at: Callable[[int, int], Float32], steps_for: Callable[[float], int], least: int, most: int
+) -> tuple[Float32, float]:
+    """(velocities [K,G,G,G,3], bound of |dv/dz|) of a piece, in as many steps as that takes.
+
+    slice_at(k, K): the velocity of step k of K; steps_for(bound): steps for a bound, from `least` to `most`.
+    The first, the middle and the last of the least number of steps tell how many it takes; the others are
+    made where that suffices.
+    """
+    steps, slices = least, {k: slice_at(k, least) for k in (0, least // 2, least - 1)}
+    bound = max(map(slope_bound, slices.values()))
+    while True:
+        if bound > steps * ENOUGH_STRAIN and steps < most:
+            steps, slices = steps_for(bound), {}
+        slices.update({k: slice_at(k, steps) for k in range(steps) if k not in slices})
+        bound = max(map(slope_bound, slices.values()))
+        if bound <= steps * ENOUGH_STRAIN or steps >= most:
+            return np.stack([slices[k] for k in range(steps)]), bound
 
 
 def falloff_numbers(falloff: Falloff) -> Array:
@@ -148,17 +176,22 @@ def falloff_numbers(falloff: Falloff) -> Array:
 def sampled(piece: Piece, s: float) -> tuple[Array, Float32, float]:
     """(frame [11,3], samples [30,M], blur) of a piece at time s, as `kernels.lattice_flow` takes them."""
     c, F, dc, dF = piece.frame(s)
-    counts = sample_counts(piece.shape)
-    u = np.stack(
-        [g.ravel() for g in np.meshgrid(*((np.arange(n) + 0.5) / n for n in counts), indexing="ij")], axis=1
-    )
+    counts, u = _sample_places(piece.shape)
     y, dy, d, dd = piece.samples(s, u)
     frame = np.concatenate([c[None], dc[None], np.linalg.inv(F), dF, F])
-    inverse = np.linalg.inv(dy).reshape(-1, 9)
+    inverse = hexahedron.invert(dy).reshape(-1, 9)
     rows = [y, u, np.linalg.norm(F @ dy, axis=1), inverse, d, dd.reshape(-1, 9)]
     samples = np.ascontiguousarray(np.concatenate(rows, axis=1).T, dtype=np.float32)
-    spacing = np.linalg.norm(dy, axis=1) / np.array(counts)
+    spacing = np.linalg.norm(dy, axis=1) / counts
     return frame, samples, float((0.5 * spacing.mean()) ** 2)
+
+
+@lru_cache(maxsize=64)
+def _sample_places(shape: tuple[int, int, int]) -> tuple[Array, Array]:
+    """(samples along each axis [3], their u [M,3]) of a lattice's shape."""
+    counts = sample_counts(shape)
+    axes = np.meshgrid(*((np.arange(n) + 0.5) / n for n in counts), indexing="ij")
+    return np.array(counts, dtype=np.float64), np.stack([g.ravel() for g in axes], axis=1)
 
 
 def sample_counts(shape: tuple[int, int, int]) -> tuple[int, int, int]:
@@ -173,18 +206,13 @@ def slope_bound(grid: Float32) -> float:
     """A bound of |dv/dz| (Frobenius norm) of the trilinear interpolation of a grid [G,G,G,3] over [-1,1]^3.
 
     In a cell the derivative along an axis is a mean of the differences on its four edges along that axis.
+    Infinite where a velocity is not finite.
     """
-    total = np.zeros(3 * (len(grid) - 1,), dtype=np.float32)
-    for axis in range(3):
-        steps = np.diff(grid, axis=axis)
-        square = np.einsum("...c,...c->...", steps, steps)
-        for other in range(3):
-            if other != axis:
-                ends = [slice(None)] * 3, [slice(None)] * 3
-                ends[0][other], ends[1][other] = slice(None, -1), slice(1, None)
-                square = np.maximum(square[tuple(ends[0])], square[tuple(ends[1])])
-        total += square
-    return 0.5 * (len(grid) - 1) * float(np.sqrt(total.max()))
+    from cagefield.warps.kernels.lattice_flow import largest_slope
+
+    if not np.isfinite(grid).all():
+        return float("inf")
+    return float(0.5 * (len(grid) - 1) * np.sqrt(largest_slope(grid)))
 
 
 def outer_distance(confines: Extended, z: Array) -> Array:

@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 from cagefield.geometry import bspline_lattice, lattice_determinant
 from cagefield.geometry.cage import MAX_WAY_STATES, LatticeCage
 from cagefield.typing import Array
+from cagefield.warps.linear_motion import LinearMotion
 
 MOST_TURN = 1.6
 """Radians by which a part of the lattice may turn against the whole within a piece, if there are states."""
@@ -49,6 +50,12 @@ class Piece:
         return self.start - a, (self.end - b) @ np.linalg.inv(M).T
 
     @cached_property
+    def padded(self) -> tuple[Array, Array]:
+        """Padded y_A and y_B - y_A, as kernels take them."""
+        y_a, y_b = self.local
+        return bspline_lattice.padded(y_a, self.shape), bspline_lattice.padded(y_b - y_a, self.shape)
+
+    @cached_property
     def is_one_to_one(self) -> bool:
         """True where the determinant is proven positive all the way."""
         if np.linalg.det(self._fit[2]) <= 1e-6:
@@ -61,26 +68,21 @@ class Piece:
         """Largest angle in radians by which a sampled part of the lattice turns against the whole."""
         y_a, y_b = self.local
         u = bspline_lattice.grid((2 * self.shape[0] - 1, 2 * self.shape[1] - 1, 2 * self.shape[2] - 1))
-        A, B = (bspline_lattice.evaluate(y, self.shape, self.interpolation, u)[1] for y in (y_a, y_b))
+        both = np.concatenate([y_a, y_b], axis=1)
+        slopes = bspline_lattice.evaluate(both, self.shape, self.interpolation, u)[1]
+        A, B = slopes[:, :3], slopes[:, 3:]
         U, _, Vt = np.linalg.svd(B @ np.linalg.inv(A))
         return float(Rotation.from_matrix(U @ Vt).magnitude().max())
 
     def frame(self, s: float) -> tuple[Array, Array, Array, Array]:
         """(c [3], F [3,3], dc/ds [3], dF/ds [3,3]) at time s."""
         a, b, _ = self._fit
-        turn, sigma, Vt = self._polar
-        x, y, z = turn
-        omega = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        R = Rotation.from_rotvec(s * turn).as_matrix()
-        F = R @ (Vt.T * sigma**s) @ Vt
-        dF = omega @ F + R @ (Vt.T * (np.log(sigma) * sigma**s)) @ Vt
+        (F,), (dF,) = self._linear.at(np.array([s]))
         return a + s * (b - a), F, b - a, dF
 
     @cached_property
-    def _polar(self) -> tuple[Array, Array, Array]:
-        """(rotation vector [3] of R, singular values [3] of M, their axes in rows [3,3])."""
-        U, sigma, Vt = np.linalg.svd(self._fit[2])
-        return Rotation.from_matrix(U @ Vt).as_rotvec(), sigma, Vt
+    def _linear(self) -> LinearMotion:
+        return LinearMotion(np.eye(3), self._fit[2])
 
     @cached_property
     def _evaluated(self) -> dict[bytes, tuple[Array, Array]]:
@@ -116,8 +118,9 @@ def pieces_between(inner: LatticeCage, deformed: LatticeCage) -> tuple[Piece, ..
         for to in range(len(states) - 1, at, -1):
             piece = Piece(states[at], states[to], inner.shape, inner.interpolation)
             if piece.is_one_to_one:
+                is_last = found is None and to == at + 1  # taken whatever it turns by
                 found = found or (to, piece)
-                if piece.turn <= MOST_TURN:
+                if is_last or piece.turn <= MOST_TURN:
                     found = to, piece
                     break
         if found is None:

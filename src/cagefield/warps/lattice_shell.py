@@ -225,12 +225,16 @@ class Surroundings:
         return self._faded(X, r, dr)
 
     def _faded(self, X: Array, r: Array, dr: Array) -> tuple[Array, Array]:
-        A, _ = self.inner.affine
         u = self.material(X)
         rho, drho = self._rho(X, u)
+        slope = r[:, :, None] * drho[:, None] + rho[:, None, None] * self._along_faces(u, dr)
+        return rho[:, None] * r, slope
+
+    def _along_faces(self, u: Array, dr: Array) -> Array:
+        """d r(clamp X)/dX [N,3,3] at u [N,3] of X, from dr/dX [N,3,3] at clamp X."""
+        A, _ = self.inner.affine
         within = ((u >= 0.0) & (u <= 1.0)).astype(np.float64)
-        clamp_slope = (A * within[:, None]) @ np.linalg.inv(A)
-        return rho[:, None] * r, r[:, :, None] * drho[:, None] + rho[:, None, None] * (dr @ clamp_slope)
+        return np.asarray(dr @ ((A * within[:, None]) @ np.linalg.inv(A)))
 
     def _rho(self, X: Array, u: Array) -> tuple[Array, Array]:
         """(rho [N], its gradient [N,3])."""
@@ -316,11 +320,16 @@ class Surroundings:
         lengths = np.linalg.norm(outwards @ A.T, axis=1)
         z, dz = self._in_outer(b + u @ A.T), outwards @ A.T @ self.flow.confines.inverse.T
         room = ((1.0 - z * np.sign(dz)) / np.maximum(np.abs(dz), 1e-9)).min(axis=1) * lengths
+        # d(rho r)/dX = r drho^T + rho S, with S = dr clamp'; the clamp's slope is that of the face all along.
+        S = self._along_faces(u + outwards, dr)
+        rS, SS, rr = (r[:, None] @ S)[:, 0], (S * S).sum(axis=(1, 2)), (r * r).sum(axis=1)
         most = 0.0
         for share in (1e-3, 0.15, 0.35, 0.6):
-            X = b + (u + outwards * (share * room / lengths)[:, None]) @ A.T
-            most = max(most, float(np.linalg.norm(self._faded(X, r, dr)[1], axis=(1, 2)).max()))
-        return most
+            v = u + outwards * (share * room / lengths)[:, None]
+            rho, drho = self._rho(b + v @ A.T, v)
+            square = rr * (drho * drho).sum(axis=1) + rho * (2.0 * (rS * drho).sum(axis=1) + rho * SS)
+            most = max(most, float(square.max()))
+        return float(np.sqrt(most))
 
 
 @flow_between.register

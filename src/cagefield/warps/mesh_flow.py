@@ -16,13 +16,10 @@ from cagefield.geometry.triangle_mesh import Triangles
 from cagefield.typing import Array, Float32
 from cagefield.warps.extended_coordinates import Extended
 from cagefield.warps.falloff import Falloff
-from cagefield.warps.lattice_flow import STEP_STRAIN, falloff_numbers, outer_distance, slope_bound
+from cagefield.warps.lattice_flow import STEP_STRAIN, falloff_numbers, outer_distance, slices_in_steps
 from cagefield.warps.linear_motion import LinearMotion
 
 MIN_MESH_STEPS, MAX_MESH_STEPS = 4, 64
-
-ENOUGH_STRAIN = 0.9
-"""h |dv/dz| of a step that is not made shorter; a step is proven one to one below 2."""
 
 SWEEPS = 16
 """Sweeps over the vertices that make the grid's velocity theirs, see `meet_points`."""
@@ -172,14 +169,15 @@ class MeshFlow:
 
     def _slices(self, piece: MeshPiece) -> tuple[Float32, float]:
         """(velocities [K,G,G,G,3] of a piece, most h |dv/dz|), in as many steps as it takes."""
-        # As few steps as there may be tell how many it takes.
-        steps, strain = 0, 0.0
-        while steps == 0 or (strain > steps * ENOUGH_STRAIN and steps < MAX_MESH_STEPS):
-            steps = int(np.clip(np.ceil(strain / STEP_STRAIN), MIN_MESH_STEPS, MAX_MESH_STEPS))
-            h = 1.0 / steps
-            slices = np.stack([self._slice(piece, k * h, h) for k in range(steps)])
-            strain = 1.05 * max(slope_bound(part) for part in slices)
-        return slices, strain / (1.05 * steps)
+
+        def slice_at(k: int, steps: int) -> Float32:
+            return self._slice(piece, k / steps, 1.0 / steps)
+
+        def steps_for(bound: float) -> int:
+            return int(np.clip(np.ceil(1.05 * bound / STEP_STRAIN), MIN_MESH_STEPS, MAX_MESH_STEPS))
+
+        slices, bound = slices_in_steps(slice_at, steps_for, MIN_MESH_STEPS, MAX_MESH_STEPS)
+        return slices, bound / len(slices)
 
     def _slice(self, piece: MeshPiece, s: float, h: float) -> Float32:
         """The velocity [G,G,G,3] of the step from s to s + h."""

@@ -116,14 +116,15 @@ class MeshShell:
 
     def sample(self, resolution: int) -> Float32:
         """Displacements to canonical space [R^3,3], x fastest, of the nodes of a `Lattice`; in float32."""
-        from cagefield.warps.kernels.lattice_nodes import MESH_ITERATIONS
+        from cagefield.warps.kernels.lattice_nodes import mesh_iterations
 
         if not self._pieces:
             return np.zeros((resolution**3, 3), dtype=np.float32)
         flow = self.flow
         center, inverse, frame = self._confines
         frames = np.concatenate([center[None], inverse, frame])
-        out = flow_nodes(flow.velocities, flow.steps, self.outer, frames, MESH_ITERATIONS, resolution)
+        iterations = mesh_iterations(flow.strain)
+        out = flow_nodes(flow.velocities, flow.steps, self.outer, frames, iterations, resolution)
         grid, ends = out.reshape(*3 * (resolution,), 3), [0, -1]
         grid[ends] = grid[:, ends] = grid[:, :, ends] = 0.0  # the outer faces, which the kernel rounds
         return out

@@ -177,7 +177,7 @@ class RendererCache:
     def edits(self, values: tuple[EditValues, ...]) -> list[Edit]:
         """Edits with these field values; unchanged ones are the same objects as before.
 
-        Those shown last are kept, as far as `KEPT_EDITS` and `KEPT_BYTES` allow.
+        Edits shown last are kept, as far as `KEPT_EDITS` and `KEPT_BYTES` allow.
         """
         found = []
         for each in values:

@@ -51,6 +51,42 @@ def sample_velocity(grid, z, v, G):
 
 
 @njit(**FAST)
+def largest_slope(grid):
+    """Largest sum over the axes, of all cells of a grid [G,G,G,3] float32: that of the longest squared
+    difference on a cell's four edges along the axis."""
+    cells = grid.shape[0] - 1
+    most = np.float32(0.0)
+    x = np.empty((2, 2, cells), np.float32)  # squared differences along x on the rows around a line of cells
+    for k in range(cells):
+        for j in range(cells):
+            for r in range(2):
+                for q in range(2):
+                    row = grid[k + r, j + q]
+                    for i in range(cells):
+                        d0, d1, d2 = (
+                            row[i + 1, 0] - row[i, 0],
+                            row[i + 1, 1] - row[i, 1],
+                            row[i + 1, 2] - row[i, 2],
+                        )
+                        x[r, q, i] = d0 * d0 + d1 * d1 + d2 * d2
+            low, high, far, end = grid[k, j], grid[k, j + 1], grid[k + 1, j], grid[k + 1, j + 1]
+            y0 = z0 = np.float32(0.0)
+            for i in range(cells + 1):
+                ya = yb = za = zb = np.float32(0.0)
+                for n in range(3):
+                    ya += (high[i, n] - low[i, n]) * (high[i, n] - low[i, n])
+                    yb += (end[i, n] - far[i, n]) * (end[i, n] - far[i, n])
+                    za += (far[i, n] - low[i, n]) * (far[i, n] - low[i, n])
+                    zb += (end[i, n] - high[i, n]) * (end[i, n] - high[i, n])
+                y1, z1 = max(ya, yb), max(za, zb)
+                if i > 0:
+                    along = max(max(x[0, 0, i - 1], x[0, 1, i - 1]), max(x[1, 0, i - 1], x[1, 1, i - 1]))
+                    most = max(most, along + max(y0, y1) + max(z0, z1))
+                y0, z0 = y1, z1
+    return most
+
+
+@njit(**FAST)
 def _inverse(A, out):
     """Writes A^-1 [3,3]."""
     for i in range(3):
