@@ -39,7 +39,8 @@ deformed space against the inverse of that to canonical space, and of the map to
 
 KINKED_STEP_STRAIN = 0.05
 """Strain of a step for a velocity with a kink, that of the linear falloff where it ends: a step over it errs
-by the square of its length. One point of radius .5, moved by 2: 1.4e-3 with 0.25, 7e-5 with 0.06, 2e-5 with 0.03."""
+by the square of its length. One point of radius .5, moved by 2: 1.4e-3 with 0.25, 7e-5 with 0.06, 2e-5 with
+0.03."""
 
 PROVEN = 0.69
 """Most h L of a step that is proven to be one to one; see above."""
