@@ -6,7 +6,8 @@ With s = 1 - d / r, d the distance and r the radius, the weight is 1 at s = 1 an
     sharp   s^2                     linear  s
 
 The curves of proportional editing in 3D editors. The square roots of sphere and root rise without a bound
-where the motion ends, at s = 0, and a flow needs one. Below a small e = `ROOT_END` of its argument q the root is
+where the motion ends, at s = 0, and a flow needs one. Below a small e = `ROOT_END` of its argument q the
+root is
 
     sqrt(e) (5 u^2 - 3 u^3) / 2,    u = q / e,
 
