@@ -88,10 +88,17 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+@pytest.hookimpl(trylast=True)
 def pytest_sessionfinish() -> None:
-    """Gives them back: else Quadrants' runtime is never freed, and the kernels that this process compiled are
-    not written to the disk."""
+    """Writes the kernels that this process compiled to the disk, after which none can be launched.
+
+    Quadrants does it when its runtime is freed: never, where an object that was frozen or is kept holds it.
+    """
     gc.unfreeze()
+    impl = sys.modules.get("quadrants.lang.impl")
+    program = None if impl is None else impl.get_runtime()._prog
+    if program is not None:
+        program.dump_cache_data_to_disk()
 
 
 @pytest.fixture(scope="session")

@@ -17,6 +17,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 
+@pytest.mark.nightly
 def test_two_kills_among_three_workers_lose_no_task(tmp_path: Path) -> None:
     tasks = {str(n): Task(cubed, (n,)) for n in range(8)} | {"killer": Task(killed_twice, (tmp_path,))}
     with pytest.warns(UserWarning, match="2 workers were lost; others took their tasks"):

@@ -129,6 +129,7 @@ def test_what_cameras_see_of_a_floor() -> None:
     assert not left.hole[2:7, 1:4].any() and left.hole[1:8, 4:8].all()
 
 
+@pytest.mark.nightly
 def test_units_make_no_difference(scenes: tuple[Scene, Scene]) -> None:
     scene, _ = scenes
     large = Scene(room(True, scale=50.0), cameras={"train": cameras(50.0)})

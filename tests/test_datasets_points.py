@@ -25,7 +25,6 @@ from cagefield.datasets.sfm.triangulation import nearest_pairs, triangulate
 from cagefield.datasets.views import SparsePoints
 from cagefield.errors import DatasetError
 from posed_photos import distance_to_textures, photo_of_textures, ring, save, textured_capture
-from tiers import nightly_after_first
 
 pytest.importorskip("pycolmap", reason="points are triangulated by pycolmap")
 
@@ -76,9 +75,8 @@ def test_training_views_alone_make_the_points_of_a_training(data, points, tmp_pa
     assert any(seen & tested for seen in everything.seen_by)
 
 
-@pytest.mark.parametrize(
-    ("lens", "cut_out"), nightly_after_first([("opencv_fisheye", False), ("opencv", True)])
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize(("lens", "cut_out"), [("opencv_fisheye", False), ("opencv", True)])
 def test_fisheyes_and_cut_outs(tmp_path, lens, cut_out):
     data = load_dataset(textured_capture(tmp_path, 8, 1.2, cut_out, lens), holdout=0)
     found = starting_points(data)

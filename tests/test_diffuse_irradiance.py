@@ -116,6 +116,7 @@ def test_what_is_all_dark_or_all_on_one_plane_says_nothing() -> None:
     assert fit_diffuse_light(first, second, chance.normal(size=2000)) is None
 
 
+@pytest.mark.nightly
 def test_a_black_scene_can_be_edited() -> None:
     lit = balls(np.zeros(3), 32)
     black = dataclasses.replace(lit, sh=np.full_like(lit.sh, -0.5 / C0))

@@ -46,27 +46,12 @@ def code_of(html: str) -> list[str]:
     return [unescape(re.sub(r"<[^>]+>", "", block)) for block in blocks]
 
 
-def test_another_field_shows_a_program_that_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_field_shows_the_program_that_test_examples_runs() -> None:
     html = rendered("docs/how-to/another-field.md")
     assert "examples/own_field.py" in html
     shown = [code for code in code_of(html) if "class OwnField" in code]
     assert len(shown) == 1
     assert shown[0].strip() == (ROOT / "examples/own_field.py").read_text(encoding="utf-8").strip()
-
-    pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
-    from cagefield.images.image_files import read_image
-
-    names: dict[str, object] = {"__name__": "shown"}
-    exec(shown[0], names)
-    monkeypatch.chdir(tmp_path)
-    main = names["main"]
-    assert callable(main)
-    main("edited.png")
-    image = read_image(tmp_path / "edited.png")
-    # Two views of 64 x 64 pixels beside each other; the ring covers a part of each, on white.
-    assert image.shape == (64, 128, 3)
-    for half in (image[:, :64], image[:, 64:]):
-        assert 0.1 < (half.min(axis=2) < 250).mean() < 0.9
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

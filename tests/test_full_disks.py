@@ -200,6 +200,7 @@ def test_a_training_goes_on_where_its_checkpoint_does_not_fit(tmp_path: Path) ->
     assert again.step == 2
 
 
+@pytest.mark.nightly
 def test_a_scene_without_room_says_where_its_training_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

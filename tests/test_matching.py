@@ -12,7 +12,6 @@ from cagefield.datasets.sfm.features import Photo
 from cagefield.datasets.sfm.matching import match
 from cagefield.errors import DatasetError
 from posed_photos import textured_capture
-from tiers import nightly_after_first
 
 pycolmap = pytest.importorskip("pycolmap", reason="features are matched by pycolmap")
 
@@ -47,7 +46,8 @@ def matched(extracted, folder, **options):
         return dict(zip(*opened.read_all_matches(), strict=True)), dict(zip(*geometries, strict=True))
 
 
-@pytest.mark.parametrize("verify", nightly_after_first([True, False]))
+@pytest.mark.nightly
+@pytest.mark.parametrize("verify", [True, False])
 def test_several_processes_match_as_one(extracted, tmp_path, verify):
     found = {}
     for processes in (1, 2):

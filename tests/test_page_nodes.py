@@ -20,10 +20,11 @@ from cagefield.pages.page_splats import MAGIC, VERSION, decode_page_splats
 from cagefield.pages.scene_page import INDEX, ScenePage, write_folder
 from commands import printed, refused
 from exported_page import pixels, rendered, settle, shown, until, web_server
-from page_fields import SIZE
 from splat_scenes import ball_of_splats
 
 COARSE, NODE = 240, 500
+SIZE = 120
+"""Pixels of a side: enough to tell a node from its parent."""
 COLUMNS = ("means", "log_scales", "quaternions", "opacities", "sh")
 
 
@@ -102,7 +103,7 @@ def test_a_page_draws_a_node_or_its_parent(tmp_path: Path) -> None:
     # The nodes wait for the events; all but the nearest one for the second.
     with (
         web_server(tmp_path, dict.fromkeys(names, 8), first, {names[nearest]: first}, second) as link,
-        shown(f"{link}/{INDEX}") as tab,
+        shown(f"{link}/{INDEX}", size=SIZE) as tab,
     ):
         settle(tab, "level")
         assert psnr(pixels(tab), coarse) >= 45.0

@@ -34,6 +34,7 @@ def test_it_ends_by_itself_and_keeps_the_kernels_that_it_compiled(
     assert list((tmp_path / "cache").rglob("*.qdc"))
 
 
+@pytest.mark.nightly
 def test_a_process_whose_server_has_gone_before_it_is_ready_ends_quietly(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

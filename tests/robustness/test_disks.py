@@ -17,8 +17,6 @@ from disk_commands import DISK_COMMANDS, DiskCommand, sources
 from disks import BYTES, Filled, disk, room_for
 from shortages import PAGE, SHORTAGES
 
-from tiers import nightly_after_first
-
 
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
@@ -56,8 +54,9 @@ def test_a_command_on_a_disk_without_names(source: Path, name: str) -> None:
     assert found.runs - found.fitted >= 3
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(write_limits.why_not() is not None, reason=str(write_limits.why_not()))
-@pytest.mark.parametrize("short", nightly_after_first(["closing", "quota", "names of a quota"]))
+@pytest.mark.parametrize("short", ["closing", "quota", "names of a quota"])
 def test_a_command_whose_writes_are_refused(source: Path, short: str) -> None:
     """In processes of their own: a library that counts what is written is loaded before the C library."""
     root = Path(__file__).resolve().parents[2]
