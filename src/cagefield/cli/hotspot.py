@@ -65,7 +65,7 @@ class HotspotCommand:
             self._write(hotspots, self.dump)
         shown = self._shown(dataclasses.replace(scene, hotspots=hotspots))
         for number, (hotspot, seen) in enumerate(zip(hotspots, shown, strict=True), start=1):
-            place = ", ".join(f"{value:.6g}" for value in (seen or hotspot).position)
+            place = ", ".join(f"{round(value, 12) + 0.0:.6g}" for value in (seen or hotspot).position)
             notes = [
                 *(["camera"] if hotspot.view else []),
                 *(["follows the edits"] if hotspot.follows else []),
