@@ -44,7 +44,7 @@ def test_fifty_edits_of_every_kind_keep_their_promises(kind: str) -> None:
 
 
 def test_a_correction_that_is_steep_at_a_corner_alone_is_found() -> None:
-    """A corner drag beside whose corner the correction folded: its slope there was not sampled along faces."""
+    """A drag of a corner beside which the correction folded: its slope along faces was not sampled there."""
     row = run(("lattice, bspline", 200, 24))
     assert row.failures == (), row
 

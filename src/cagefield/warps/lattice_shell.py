@@ -312,7 +312,7 @@ class Surroundings:
 
     @cached_property
     def slope(self) -> float:
-        """Largest |d(rho r)/dX| (Frobenius norm) at 4 distances from each sample, beyond each of its faces."""
+        """Largest |d(rho r)/dX| (Frobenius norm) at 4 distances beyond each face of every sample."""
         u, r, dr = self._samples
         A, b = self.inner.affine
         on_face = np.where(np.abs(u - 0.5) == 0.5, u - 0.5, 0.0)
