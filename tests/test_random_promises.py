@@ -42,6 +42,12 @@ def test_fifty_edits_of_every_kind_keep_their_promises(kind: str) -> None:
     assert np.median([row.least_det for row in rows]) < 0.9
 
 
+def test_a_correction_that_is_steep_at_a_corner_alone_is_found() -> None:
+    """A drag of a corner beside which the correction folded: its slope along faces was not sampled there."""
+    row = run(("lattice, bspline", 200, 24))
+    assert row.failures == (), row
+
+
 def test_edits_are_of_their_kind_in_an_outer_cage_and_the_draws_repeat() -> None:
     for kind in KINDS:
         edit, seed, refused = possible_edit(kind, 3)

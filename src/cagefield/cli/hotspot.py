@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -37,6 +37,8 @@ class HotspotCommand:
     """Position, world units, where the edited scene shows it."""
     text: str | None = None
     """Plain text, which pages show beside it."""
+    follow: Literal["yes", "no"] | None = None
+    """Whether the edits carry the hotspot and its camera along; without it a new one stays at --at."""
     camera: Annotated[tuple[str, int] | None, tyro.conf.arg(metavar="SPLIT INDEX")] = None
     """Camera to look from, one of the scene's: test 3, say. Without one, halfway from the first view."""
     remove: tuple[str, ...] = ()
@@ -61,11 +63,33 @@ class HotspotCommand:
             dataclasses.replace(scene, hotspots=hotspots).save_manifest(self.scene)
         if self.dump is not None:
             self._write(hotspots, self.dump)
-        for number, hotspot in enumerate(hotspots, start=1):
-            place = ", ".join(f"{value:.6g}" for value in hotspot.position)
-            print(f"{number:<4}{hotspot.title}  ({place}){', camera' if hotspot.view else ''}")
+        shown = self._shown(dataclasses.replace(scene, hotspots=hotspots))
+        for number, (hotspot, seen) in enumerate(zip(hotspots, shown, strict=True), start=1):
+            place = ", ".join(f"{round(value, 12) + 0.0:.6g}" for value in (seen or hotspot).position)
+            notes = [
+                *(["camera"] if hotspot.view else []),
+                *(["follows the edits"] if hotspot.follows else []),
+                *(["hidden by them"] if seen is None else []),
+            ]
+            print(f"{number:<4}{hotspot.title}  ({place}){''.join(f', {note}' for note in notes)}")
         if not hotspots:
             print("no hotspots")
+
+    def _shown(self, scene: Scene) -> tuple[Hotspot | None, ...]:
+        from cagefield.scene.hotspot_motion import moving_edits, shown_hotspots
+
+        return shown_hotspots(scene.hotspots, moving_edits(scene))
+
+    def _placed(self, scene: Scene, hotspot: Hotspot, follows: bool) -> Hotspot:
+        """Hotspot at a place of the edited scene, which follows the edits from there or stays."""
+        from cagefield.scene.hotspot_motion import edits_with_detours, following
+
+        if not follows:
+            return hotspot
+        placed = following(hotspot, edits_with_detours(scene))
+        if placed is None:
+            raise CagefieldError("the edits leave nothing at --at that a hotspot could follow; move --at")
+        return placed
 
     def _check(self) -> None:
         actions = [self.add, self.change, self.load, self.remove or None, self.order or None]
@@ -73,11 +97,11 @@ class HotspotCommand:
             raise CagefieldError(
                 "--add, --change, --remove, --order and --load exclude each other; give one of them"
             )
-        if (self.at, self.text, self.camera) != (None, None, None) and (self.add, self.change) == (
-            None,
-            None,
-        ):
-            raise CagefieldError("--at, --text and --camera are for --add and --change; give its title")
+        values = (self.at, self.text, self.camera, self.follow)
+        if any(value is not None for value in values) and self.add is None and self.change is None:
+            raise CagefieldError(
+                "--at, --text, --camera and --follow are for --add and --change; give its title"
+            )
         if self.add is not None and self.at is None:
             raise CagefieldError("--add needs a position; give --at X Y Z")
         if self.title is not None and self.change is None:
@@ -91,7 +115,8 @@ class HotspotCommand:
 
         hotspots = scene.hotspots
         if self.add is not None and self.at is not None:
-            return (*hotspots, Hotspot(self.add, self.at, _lines(self.text or ""), self._view(scene)))
+            hotspot = Hotspot(self.add, self.at, _lines(self.text or ""), self._view(scene))
+            return (*hotspots, self._placed(scene, hotspot, self.follow == "yes"))
         if self.change is not None:
             index = find_hotspot(hotspots, self.change)
             values = {
@@ -101,7 +126,14 @@ class HotspotCommand:
                 "view": self._view(scene),
             }
             given = {name: value for name, value in values.items() if value is not None}
-            changed = dataclasses.replace(hotspots[index], **given)  # type: ignore[arg-type]
+            before = hotspots[index]
+            follows = before.follows if self.follow is None else self.follow == "yes"
+            if set(given) <= {"title", "text"} and follows == before.follows:
+                changed = dataclasses.replace(before, **given)  # type: ignore[arg-type]
+            else:
+                seen = self._shown(scene)[index] or dataclasses.replace(before, follows=False)
+                moved = dataclasses.replace(seen, **given)  # type: ignore[arg-type]
+                changed = self._placed(scene, moved, follows)
             return (*hotspots[:index], changed, *hotspots[index + 1 :])
         if self.remove:
             gone = {find_hotspot(hotspots, name) for name in self.remove}

@@ -238,12 +238,14 @@ class Render:
 
     def _tour(self, scene: Scene, stop_seconds: float) -> tuple[list[Camera], float]:
         """Cameras of the tour of the hotspots, and the frame rate."""
+        from cagefield.scene.hotspot_motion import visible_hotspots
         from cagefield.scene.hotspot_tour import tour_cameras
 
         first, fps = scene.first_camera, self.fps or 24.0
         width, height = parse_size(self.size, first.width, first.height)
+        hotspots = visible_hotspots(scene)
         cameras = tour_cameras(
-            scene.hotspots, first, scene.up, stop_seconds=stop_seconds, fps=fps, width=width, height=height
+            hotspots, first, scene.up, stop_seconds=stop_seconds, fps=fps, width=width, height=height
         )
         return list(cameras), fps
 

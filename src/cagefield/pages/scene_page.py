@@ -35,7 +35,8 @@ from cagefield.rendering.splats.raster_splats import changed_splats
 from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.splats.splitting import split_of
 from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
-from cagefield.scene.hotspots import resolved_view
+from cagefield.scene.hotspot_motion import visible_hotspots
+from cagefield.scene.hotspots import Hotspot, resolved_view
 from cagefield.scene.scene import Scene
 
 _HERE = files("cagefield.pages")
@@ -120,8 +121,9 @@ class ScenePage:
             "path": _path(keys, loop),
             "extent": 2.0 * float(np.linalg.norm(scene.field.half_size)),
         }
-        if scene.hotspots:
-            header["hotspots"] = _hotspots(scene)
+        hotspots = visible_hotspots(scene)
+        if hotspots:
+            header["hotspots"] = _hotspots(scene, hotspots)
         if scene.alignment.meters_per_unit is not None:
             header["meters_per_unit"] = scene.alignment.meters_per_unit
         return cls(title, header, found, along, nodes)
@@ -236,10 +238,10 @@ def _view(camera: Camera) -> dict[str, Any]:
     return {"c2w": camera.c2w.ravel().tolist(), "fov_y_deg": math.degrees(2.0 * math.atan(0.5 * least))}
 
 
-def _hotspots(scene: Scene) -> list[dict[str, Any]]:
-    """Texts, positions and views of the scene's hotspots."""
+def _hotspots(scene: Scene, hotspots: tuple[Hotspot, ...]) -> list[dict[str, Any]]:
+    """Texts, positions and views of hotspots in the edited scene."""
     first, up = scene.first_camera, scene.up
-    views = [resolved_view(hotspot, first, up) for hotspot in scene.hotspots]
+    views = [resolved_view(hotspot, first, up) for hotspot in hotspots]
     return [
         {
             "title": hotspot.title,
@@ -247,7 +249,7 @@ def _hotspots(scene: Scene) -> list[dict[str, Any]]:
             "position": list(hotspot.position),
             "view": {"c2w": list(view.c2w), "fov_y_deg": view.fov_y_deg},
         }
-        for hotspot, view in zip(scene.hotspots, views, strict=True)
+        for hotspot, view in zip(hotspots, views, strict=True)
     ]
 
 

@@ -1,6 +1,7 @@
 """Hotspots of a scene: points with a title and plain text, for the editor and exported pages.
 
-Positions are world units of the edited scene (deformed space), where a viewer of the edits sees them.
+Positions are world units. A hotspot that follows the edits is kept in canonical space, and shown where they
+carry it (`hotspot_motion`); the others are kept in deformed space, where a viewer of the edits sees them.
 Titles and texts are plain text everywhere; no program reads markup in them.
 """
 
@@ -56,7 +57,10 @@ class HotspotView:
 
 @dataclass(frozen=True)
 class Hotspot:
-    """A point of the edited scene [3], world units, with a title, a text and the camera to look from.
+    """A point of a scene [3], world units, with a title, a text and the camera to look from.
+
+    `follows`: the edits carry the position and the camera, both of canonical space; else they are of the
+    edited scene, and stay.
 
     Raises:
         SceneError: a title without characters, a title or text that is too long or has control characters, a
@@ -67,8 +71,11 @@ class Hotspot:
     position: tuple[float, float, float]
     text: str = ""
     view: HotspotView | None = None
+    follows: bool = False
 
     def __post_init__(self) -> None:
+        if not isinstance(self.follows, bool):
+            raise SceneError(f"follows of a hotspot is {self.follows!r:.60}; it must be true or false")
         _check_text("title", self.title, MAX_TITLE_CHARACTERS, lines=False)
         if not self.title.strip():
             raise SceneError("the title of a hotspot is empty; give it a name")
@@ -82,20 +89,25 @@ class Hotspot:
             values["text"] = self.text
         if self.view is not None:
             values["camera"] = {"c2w": list(self.view.c2w), "fov_y_deg": self.view.fov_y_deg}
+        if self.follows:
+            values["follows"] = True
         return values
 
     @classmethod
     def from_value(cls, value: Any) -> Hotspot:
         """Hotspot of a file's value. Raises SceneError for anything that `to_dict` does not write."""
-        if not isinstance(value, dict) or set(value) - {"title", "position", "text", "camera"}:
+        if not isinstance(value, dict) or set(value) - {"title", "position", "text", "camera", "follows"}:
             raise SceneError(
-                f"a hotspot is {value!r:.80}; it must have title and position, and may have text and camera"
+                f"a hotspot is {value!r:.80}; it must have title and position, and may have text, camera and"
+                " follows"
             )
         if "title" not in value or "position" not in value:
             raise SceneError(f"a hotspot is {value!r:.80}; it lacks title or position")
         camera = value.get("camera")
         view = None if camera is None else _view(camera)
-        return cls(value["title"], value["position"], value.get("text", ""), view)
+        return cls(
+            value["title"], value["position"], value.get("text", ""), view, value.get("follows", False)
+        )
 
 
 def hotspots_from_value(value: Any) -> tuple[Hotspot, ...]:

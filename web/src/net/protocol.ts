@@ -505,6 +505,7 @@ export interface PutHotspot {
   text?: string;
   position: Vec3;
   camera?: HotspotCamera | null;
+  follows?: boolean;
 }
 /**
  * Deletes the selected elements from the field, or restores all that were deleted.
@@ -763,6 +764,8 @@ export interface Hello {
 }
 /**
  * A hotspot: its number, texts, position in deformed space, and the camera to look from, if any.
+ *
+ * `follows`: the edits carry it along; `hidden`: they have deleted or covered its place.
  */
 export interface HotspotState {
   id: number;
@@ -770,6 +773,8 @@ export interface HotspotState {
   text: string;
   position: Vec3;
   camera: HotspotCamera | null;
+  follows: boolean;
+  hidden: boolean;
 }
 /**
  * How far a background job is; of one whose file is to be downloaded, `page` asked for it.

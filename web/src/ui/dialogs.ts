@@ -17,11 +17,11 @@ const FORMS: [ExportSplats["form"], string][] = [
 ];
 
 /** Values of a hotspot; `id` is null for a new one. */
-export type HotspotDraft = Omit<HotspotState, "id"> & { id: number | null };
+export type HotspotDraft = Omit<HotspotState, "id" | "hidden"> & { id: number | null };
 
 /** The message that writes a hotspot. */
-export function putHotspot({ id, title, text, position, camera }: HotspotDraft): PutHotspot {
-  return { type: "put_hotspot", hotspot: id, title, text, position, camera };
+export function putHotspot({ id, title, text, position, camera, follows }: HotspotDraft): PutHotspot {
+  return { type: "put_hotspot", hotspot: id, title, text, position, camera, follows };
 }
 
 /** Lengths that the server takes. */
@@ -121,7 +121,13 @@ export function dialogs(app: App): Dialogs {
       const title = h("input", { value: before.title, required: true, maxLength: MAX_TITLE, name: "title" });
       const text = h("textarea", { value: before.text, maxLength: MAX_TEXT, name: "text", rows: 5 });
       const keepsView = h("input", { type: "checkbox", name: "view", checked: before.camera !== null });
-      const fields = [field("Title", title), field("Text", text), field("Look from this view", keepsView)];
+      const follows = h("input", { type: "checkbox", name: "follows", checked: before.follows });
+      const fields = [
+        field("Title", title),
+        field("Text", text),
+        field("Look from this view", keepsView),
+        field("Follow the edits", follows),
+      ];
       ask(
         before.id === null ? "New hotspot" : "Hotspot",
         before.id === null ? "Place" : "Change",
@@ -136,6 +142,7 @@ export function dialogs(app: App): Dialogs {
               title: title.value,
               text: text.value,
               camera: keepsView.checked ? view : null,
+              follows: follows.checked,
             }),
           );
         },

@@ -44,7 +44,7 @@ export class Hotspots {
     if (position === null) return app.say("nothing is there to mark; click on a surface", "warning");
     const camera = { c2w: app.viewport.c2w, fov_y_deg: app.viewport.camera.fov };
     const title = `Hotspot ${(app.store.now.state?.hotspots.length ?? 0) + 1}`;
-    this.dialogs.hotspot({ id: null, title, text: "", position, camera });
+    this.dialogs.hotspot({ id: null, title, text: "", position, camera, follows: true });
   }
 
   private build(): void {
@@ -58,7 +58,8 @@ export class Hotspots {
 
   private row(hotspot: HotspotState, index: number): HTMLElement {
     const { app } = this;
-    const title = h("span", { class: "name", title: hotspot.text }, hotspot.title);
+    const note = hotspot.hidden ? "the edits hide its place" : hotspot.text;
+    const title = h("span", { class: "name", title: note }, hotspot.title);
     title.ondblclick = () => !isReadOnly(app.store.now) && this.dialogs.hotspot(hotspot);
     const move = (to: number | null) => (): void => {
       app.send({ type: "move_hotspot", hotspot: hotspot.id, to });
@@ -109,7 +110,7 @@ export class Hotspots {
       const far = distance(hotspot.position, eye);
       const surface = inside ? pictures.depth.at(x / width, y / height) : null;
       const occluded = surface !== null && surface < far * (1 - OCCLUSION_SHARE) - slack;
-      element.hidden = !inside || occluded || store.now.preview !== null;
+      element.hidden = !inside || occluded || hotspot.hidden || store.now.preview !== null;
       if (!element.hidden) element.style.transform = `translate(${x}px, ${y}px)`;
     }
   }

@@ -16,6 +16,7 @@ from cagefield.edits.operations import Operation
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
 from cagefield.geometry.mesh_cage import MeshCage
+from cagefield.scene.hotspot_motion import following
 from cagefield.scene.hotspots import Hotspot
 from cagefield.selection.element_selection import Mode, Selection
 from cagefield.selection.selection_cages import outer_cage_of_shape
@@ -219,9 +220,15 @@ class Session(SessionState):
         if meters_per_unit != self.document.meters_per_unit:
             self._push("Scale in meters", replace(self.document, meters_per_unit=meters_per_unit))
 
-    def put_hotspot(self, number: int | None, hotspot: Hotspot) -> int:
-        """The number of a hotspot: a new one for None, else the one of that number, changed."""
+    def put_hotspot(self, number: int | None, hotspot: Hotspot, *, follows: bool = False) -> int:
+        """The number of a hotspot: a new one for None, else the one of that number, changed.
+
+        Its position and camera are of the edited scene; `follows` takes them back to canonical space, from
+        where edits carry them. Raises `EditError` where the edits leave nothing to follow.
+        """
         entries = self.document.hotspots
+        if follows:
+            hotspot = self._following(number, hotspot)
         if number is None:
             number = self._next_hotspot
             self._next_hotspot += 1
@@ -230,6 +237,16 @@ class Session(SessionState):
             label, entries = "Change hotspot", hotspot_list.changed(entries, number, hotspot)
         self._push_hotspots(f'{label} "{hotspot.title:.60}"', entries)
         return number
+
+    def _following(self, number: int | None, hotspot: Hotspot) -> Hotspot:
+        for entry, seen in zip(self.document.hotspots, self.shown_hotspots(), strict=True):
+            if entry.id == number and entry.hotspot.follows and seen is None:
+                # Hidden: pages know it in canonical space alone.
+                return replace(hotspot, follows=True)
+        found = following(hotspot, self._drawn(self.document.applied))
+        if found is None:
+            raise EditError("the edits leave nothing there to follow; place the hotspot on a surface")
+        return found
 
     def remove_hotspot(self, number: int) -> None:
         """A hotspot goes."""

@@ -16,6 +16,8 @@ from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
 from cagefield.geometry.detour_grid import DetourGrid
+from cagefield.scene.hotspot_motion import shown_hotspots
+from cagefield.scene.hotspots import Hotspot
 from cagefield.selection.element_selection import Selection
 from cagefield.server.editor import hotspot_list
 from cagefield.server.editor.active_drags import Drags
@@ -60,6 +62,7 @@ class SessionState:
         self._saved: Document | None = document
         self._next = max((entry.id for entry in document.entries), default=0) + 1
         self._next_hotspot = hotspot_list.next_number(document.hotspots)
+        self._hotspots: tuple[tuple[Hotspot, ...], tuple[Edit, ...], tuple[Hotspot | None, ...]] | None = None
         self._problems: IdentityCache[Edit, str | None] = IdentityCache(4 * MAX_EDITS)
         self._connected = ConnectedEdits()
         self._carriers = Carriers(self.problem, self._connected.resolved)
@@ -99,6 +102,14 @@ class SessionState:
             return self._problems[edit]
         found = problem(edit) if edit.changes_anything else None
         return self._problems.put(edit, found or self._source_problem(edit))
+
+    def shown_hotspots(self) -> tuple[Hotspot | None, ...]:
+        """Hotspots of the document where its edits, without drags, carry them; None for hidden ones."""
+        hotspots = tuple(entry.hotspot for entry in self.document.hotspots)
+        edits = self._drawn(self.document.applied) if any(each.follows for each in hotspots) else ()
+        if self._hotspots is None or self._hotspots[:2] != (hotspots, edits):
+            self._hotspots = hotspots, edits, shown_hotspots(hotspots, edits)
+        return self._hotspots[2]
 
     def drawn(self) -> tuple[Edit, ...]:
         """The edits that the picture shows, in the order of application; or the preview's.

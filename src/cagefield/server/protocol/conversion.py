@@ -20,6 +20,7 @@ from cagefield.errors import CameraError
 from cagefield.geometry.cage import Cage, LatticeCage
 from cagefield.geometry.control_points import ControlPoints
 from cagefield.geometry.mesh_cage import MeshCage
+from cagefield.scene.hotspots import Hotspot
 from cagefield.selection.element_selection import Selection
 from cagefield.server.editor.document import Entry
 from cagefield.server.editor.drag_solver import Moved, move_corners
@@ -224,18 +225,29 @@ def state_of(
             for key in document.keys
         ],
         loop=document.loop,
-        hotspots=[_hotspot_state(entry) for entry in document.hotspots],
+        hotspots=[
+            _hotspot_state(entry, seen)
+            for entry, seen in zip(session.document.hotspots, session.shown_hotspots(), strict=True)
+        ],
         selection=_count_of(document.selection),
         removed=_count_of(document.removed),
         isolated=session.isolated is not None,
     )
 
 
-def _hotspot_state(entry: HotspotEntry) -> server_messages.HotspotState:
-    hotspot, view = entry.hotspot, entry.hotspot.view
+def _hotspot_state(entry: HotspotEntry, seen: Hotspot | None) -> server_messages.HotspotState:
+    """State of a hotspot that the edited scene shows as `seen`, or not at all."""
+    hotspot = entry.hotspot if seen is None else seen
+    view = hotspot.view
     camera = None if view is None else HotspotCamera(c2w=list(view.c2w), fov_y_deg=view.fov_y_deg)
     return server_messages.HotspotState(
-        id=entry.id, title=hotspot.title, text=hotspot.text, position=hotspot.position, camera=camera
+        id=entry.id,
+        title=hotspot.title,
+        text=hotspot.text,
+        position=hotspot.position,
+        camera=camera,
+        follows=entry.hotspot.follows,
+        hidden=seen is None,
     )
 
 

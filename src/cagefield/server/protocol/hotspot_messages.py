@@ -28,6 +28,8 @@ class PutHotspot(Message):
     text: Annotated[str, Field(max_length=MAX_TEXT_CHARACTERS)] = ""
     position: Vec3
     camera: HotspotCamera | None = None
+    follows: bool = True
+    """Whether the edits carry it along, from the position in the edited scene on."""
 
 
 class MoveHotspot(Message):

@@ -120,13 +120,18 @@ class SelectionCount(Message):
 
 
 class HotspotState(Message):
-    """A hotspot: its number, texts, position in deformed space, and the camera to look from, if any."""
+    """A hotspot: its number, texts, position in deformed space, and the camera to look from, if any.
+
+    `follows`: the edits carry it along; `hidden`: they have deleted or covered its place.
+    """
 
     id: HotspotId
     title: str
     text: str
     position: Vec3
     camera: HotspotCamera | None
+    follows: bool
+    hidden: bool
 
 
 class State(Message):

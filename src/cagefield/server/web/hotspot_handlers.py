@@ -12,7 +12,8 @@ def change_hotspots(session: Session, message: HotspotMessage) -> None:
     if isinstance(message, PutHotspot):
         camera = message.camera
         view = None if camera is None else HotspotView(tuple(camera.c2w), camera.fov_y_deg)
-        session.put_hotspot(message.hotspot, Hotspot(message.title, message.position, message.text, view))
+        hotspot = Hotspot(message.title, message.position, message.text, view)
+        session.put_hotspot(message.hotspot, hotspot, follows=message.follows)
     elif message.to is None:
         session.remove_hotspot(message.hotspot)
     else:
