@@ -312,18 +312,11 @@ class Surroundings:
 
     @cached_property
     def slope(self) -> float:
-        """Largest |d(rho r)/dX| (Frobenius norm) at 4 distances beyond each face of every sample."""
+        """Largest |d(rho r)/dX| (Frobenius norm) at 4 distances from each face sample."""
         u, r, dr = self._samples
         A, b = self.inner.affine
-        on_face = np.where(np.abs(u - 0.5) == 0.5, u - 0.5, 0.0)
-        # Beyond a face the clamp's slope is that of the face, at its edges and corners too; beyond an edge or
-        # a corner it is that of the edge, or 0.
-        ways = [on_face * np.eye(3)[axis] for axis in range(3)]
-        ways.append(np.where((on_face != 0.0).sum(axis=1, keepdims=True) > 1, on_face, 0.0))
-        rows, outwards = np.tile(np.arange(len(u)), 4), np.concatenate(ways)
-        there = np.abs(outwards).max(axis=1) > 0.0
-        rows, outwards = rows[there], 2.0 * outwards[there]
-        u, r, dr = u[rows], r[rows], dr[rows]
+        outwards = np.where(np.abs(u - 0.5) == 0.5, u - 0.5, 0.0)
+        outwards /= np.abs(outwards).max(axis=1, keepdims=True)
         lengths = np.linalg.norm(outwards @ A.T, axis=1)
         z, dz = self._in_outer(b + u @ A.T), outwards @ A.T @ self.flow.confines.inverse.T
         room = ((1.0 - z * np.sign(dz)) / np.maximum(np.abs(dz), 1e-9)).min(axis=1) * lengths
