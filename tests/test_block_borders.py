@@ -79,5 +79,5 @@ def test_exports_of_an_edit_across_borders(scenes: tuple[Scene, Scene], tmp_path
         scene.save(tmp_path / str(number))
         target = tmp_path / f"{number}.ply"
         assert main(["export", str(tmp_path / str(number)), "-o", str(target)]) == 0
-        files.append(sorted_rows(read_splats(target).field))
+        files.append(sorted_rows(read_splats(target)))
     np.testing.assert_array_equal(files[1], files[0])

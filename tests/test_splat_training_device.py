@@ -190,6 +190,7 @@ def test_frozen_splats_take_no_step_on_either_device() -> None:
     before = replace(state)
     before.take(np.arange(40))
     free = replace(before, ticks=np.zeros(40, np.int32))
+    free.take(np.arange(40))
     moving = CpuSplatOptimizer(free, NEAR, True)
     for optimizer in (moving, *pair_of(state, True)):
         compared(optimizer, view, photo_of(target, np.zeros(3)))
