@@ -42,7 +42,6 @@ def test_fifty_edits_of_every_kind_keep_their_promises(kind: str) -> None:
     assert np.median([row.least_det for row in rows]) < 0.9
 
 
-@pytest.mark.xfail(strict=True, reason="the correction's slope at corners is not sampled along faces")
 def test_a_correction_that_is_steep_at_a_corner_alone_is_found() -> None:
     """A drag of a corner beside which the correction of a lattice folds."""
     row = run(("lattice, bspline", 200, 24))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,6 +25,9 @@ GRIDS: tuple[int, ...] = (20, 32, 48)
 MOST_CORRECTION = 0.9
 """Most slope of rho r: below 1 the correction is one to one."""
 
+LEAST_CORRECTION_DET = 0.05
+"""Least det (1 + d(rho r)/dX) beside edges and corners of the canonical cage, where r may be steep."""
+
 LEAST_GAP = 2e-3
 """The gap between the lattice and the outer cage, as a share of the outer cage's half-width."""
 
@@ -44,7 +48,8 @@ class LatticeShell:
     the map equals L on the lattice's faces whatever Phi is; the better Phi follows, the less is left to r.
 
     One to one: L and its way by Bernstein coefficients, Phi step by step by a bound of its slope, R where the
-    slope of rho r is below 1, which is sampled (`Surroundings.slope`), not proven.
+    slope of rho r is below 1, or beside edges and corners, at which r may be steep, where its determinant is
+    positive; both are sampled (`Surroundings.slope`, `Surroundings.least_edge_det`), not proven.
 
     Parameters: the canonical and the deformed inner cage, the outer cage, the falloff.
     """
@@ -66,7 +71,7 @@ class LatticeShell:
         for cells in GRIDS:
             flow = LatticeFlow(self.pieces, self.outer, self.falloff, cells)
             around = Surroundings(self.inner, self.deformed, flow)
-            if flow.is_one_to_one and around.slope <= MOST_CORRECTION:
+            if flow.is_one_to_one and around.is_one_to_one:
                 break
         return around
 
@@ -161,7 +166,7 @@ class LatticeShell:
             return "finds no way for the lattice that is proven not to fold"
         if not self.around.flow.is_one_to_one:
             return "is strained too much: the lattice moves too far for its gap to the outer cage"
-        if self.around.slope > MOST_CORRECTION:
+        if not self.around.is_one_to_one:
             return "cannot follow the lattice closely enough: it is bent too much for the room around it"
         return None
 
@@ -310,23 +315,51 @@ class Surroundings:
         """Largest |r| at samples of the canonical cage's faces."""
         return float(np.linalg.norm(self._samples[1], axis=1).max())
 
+    @property
+    def is_one_to_one(self) -> bool:
+        """Whether R is one to one, as far as samples say."""
+        return self.slope <= MOST_CORRECTION and self.least_edge_det >= LEAST_CORRECTION_DET
+
+    def _outwards(self, u: Array, ways: Array) -> Iterator[tuple[Array, Array]]:
+        """(rho [S], its gradient [S,3]) at 4 distances along ways [S,3] from u [S,3] on the cage's faces."""
+        A, b = self.inner.affine
+        lengths = np.linalg.norm(ways @ A.T, axis=1)
+        z, dz = self._in_outer(b + u @ A.T), ways @ A.T @ self.flow.confines.inverse.T
+        room = ((1.0 - z * np.sign(dz)) / np.maximum(np.abs(dz), 1e-9)).min(axis=1) * lengths
+        for share in (1e-3, 0.15, 0.35, 0.6):
+            v = u + ways * (share * room / lengths)[:, None]
+            yield self._rho(b + v @ A.T, v)
+
+    @cached_property
+    def least_edge_det(self) -> float:
+        """Least det (1 + d(rho r)/dX) at 4 distances beyond each face from samples of its edges and corners.
+
+        Beyond a face the clamp's slope is that of the face; `slope` looks beyond edges and corners alone,
+        where it is that of the edge, or 0.
+        """
+        u, r, dr = self._samples
+        on_face = np.where(np.abs(u - 0.5) == 0.5, 2.0 * (u - 0.5), 0.0)
+        least = 1.0
+        for axis in range(3):
+            rows = (on_face[:, axis] != 0.0) & ((on_face != 0.0).sum(axis=1) > 1)
+            ways = on_face[rows] * np.eye(3)[axis]
+            S = self._along_faces(u[rows] + ways, dr[rows])
+            for rho, drho in self._outwards(u[rows], ways):
+                slope = r[rows][:, :, None] * drho[:, None] + rho[:, None, None] * S
+                least = min(least, float(np.linalg.det(np.eye(3) + slope).min()))
+        return least
+
     @cached_property
     def slope(self) -> float:
         """Largest |d(rho r)/dX| (Frobenius norm) at 4 distances from each face sample."""
         u, r, dr = self._samples
-        A, b = self.inner.affine
         outwards = np.where(np.abs(u - 0.5) == 0.5, u - 0.5, 0.0)
         outwards /= np.abs(outwards).max(axis=1, keepdims=True)
-        lengths = np.linalg.norm(outwards @ A.T, axis=1)
-        z, dz = self._in_outer(b + u @ A.T), outwards @ A.T @ self.flow.confines.inverse.T
-        room = ((1.0 - z * np.sign(dz)) / np.maximum(np.abs(dz), 1e-9)).min(axis=1) * lengths
         # d(rho r)/dX = r drho^T + rho S, with S = dr clamp'; the clamp's slope is that of the face all along.
         S = self._along_faces(u + outwards, dr)
         rS, SS, rr = (r[:, None] @ S)[:, 0], (S * S).sum(axis=(1, 2)), (r * r).sum(axis=1)
         most = 0.0
-        for share in (1e-3, 0.15, 0.35, 0.6):
-            v = u + outwards * (share * room / lengths)[:, None]
-            rho, drho = self._rho(b + v @ A.T, v)
+        for rho, drho in self._outwards(u, outwards):
             square = rr * (drho * drho).sum(axis=1) + rho * (2.0 * (rS * drho).sum(axis=1) + rho * SS)
             most = max(most, float(square.max()))
         return float(np.sqrt(most))
