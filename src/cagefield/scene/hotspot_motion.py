@@ -26,7 +26,7 @@ def shown_hotspots(hotspots: Sequence[Hotspot], edits: Iterable[Edit]) -> tuple[
     """Hotspots where the edited scene shows them (deformed space); None for each that is not to be seen.
 
     A hotspot that follows is not to be seen where a discrete edit has deleted its place, or covered it with
-    what it moves there. A copy takes it along; a paste moves nothing. Those that do not follow are returned
+    what it moves there. A copy takes it along; a paste moves nothing. Hotspots that do not follow return
     as they are. Positions go through the exact maps of the edits, which are in the order of their document,
     with the detours of connected control points. Raises `EditError` where an active edit cannot be evaluated.
     """
