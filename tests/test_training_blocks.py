@@ -185,7 +185,7 @@ def test_a_block_is_trained_among_frozen_splats_of_the_scaffold(capture: Dataset
     blocks, jobs = plan_blocks(capture, QUICK, 2, tmp_path)
     scaffold = jobs[0].scaffold
     assert scaffold is not None and scaffold is jobs[1].scaffold
-    assert (scaffold.config.steps, scaffold.config.splats) == (30, 200)
+    assert (scaffold.config.steps, scaffold.config.splats) == (18, 100)
     with pytest.raises(CagefieldError, match=r"scaffold\.safetensors is not there; the folder must be"):
         jobs[0].context()
     assert train_block(scaffold)

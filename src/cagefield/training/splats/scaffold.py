@@ -28,9 +28,9 @@ MIN_SPLATS = 100
 """Minimum of the maximum number of splats of a scaffold or a block."""
 MAX_PIXELS = 50_000_000
 """Maximum number of the photos' pixels in a scaffold's training, as far as MIN_SIDE_PIXELS allows."""
-STEPS_SHARE = 0.5
+STEPS_SHARE = 0.3
 """Steps of a scaffold, as a share of the training's."""
-SPLATS_SHARE = 0.5
+SPLATS_SHARE = 0.25
 """Maximum number of a scaffold's splats, as a share of the training's."""
 VIEW_MARGIN = 0.25
 """Margin around a photo within which frozen splats belong to it, as a share of its size."""
