@@ -28,8 +28,8 @@ import tyro
 from playwright.sync_api import Page, sync_playwright
 
 import cagefield
+from benchmarks.common.chromium_flags import GPU_FLAGS, SOFTWARE_FLAGS
 from benchmarks.common.machine import cpu_model
-from benchmarks.page_frames import GPU_FLAGS
 from cagefield.compute import devices
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
@@ -39,16 +39,6 @@ from cagefield.server.editor.session import LATTICE
 
 Kind = Literal["continuous", "discrete"]
 
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-]
 WINDOW = 1104, 850
 """Width and height of the window; the picture is 1058x782, with the panel closed."""
 DRAGS, MOVES, DRAG_SECONDS, DRAG_PX = 3, 10, 1.5, 40
@@ -144,7 +134,7 @@ class EditorLatency:
                 text=True,
                 env=environment,
             )
-            flags = GPU_FLAGS if self.gpu else FLAGS
+            flags = GPU_FLAGS if self.gpu else SOFTWARE_FLAGS
             browser = playwright.chromium.launch(executable_path=chromium, args=flags)
             try:
                 assert server.stdout is not None

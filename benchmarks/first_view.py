@@ -26,8 +26,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from playwright.sync_api import sync_playwright
 
 import cagefield
+from benchmarks.common.chromium_flags import SOFTWARE_FLAGS
 from benchmarks.common.machine import cpu_model
-from chromium import CHROMIUM, FLAGS
+from chromium import CHROMIUM
 
 PATIENCE = 600.0
 TICK = os.sysconf("SC_CLK_TCK")
@@ -83,7 +84,7 @@ class FirstView:
             "PYTHONUNBUFFERED": "1",
         }
         with sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_FLAGS)
             page = browser.new_page(viewport={"width": 800, "height": 600})
             idle = cpu(chromium())
             began = time.monotonic()

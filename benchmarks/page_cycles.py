@@ -30,11 +30,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from playwright.sync_api import Page, sync_playwright
 
+from benchmarks.common.chromium_flags import SOFTWARE_FLAGS
 from benchmarks.common.machine import cpu_model
 from cagefield.fields.splat_field import SplatField
 from cagefield.pages.scene_page import ScenePage
 from cagefield.scene.scene import Scene
-from chromium import CHROMIUM, FLAGS
+from chromium import CHROMIUM
 from editor_page import asking
 from field_page import FieldPage, field_page
 from gpu_objects import COUNT
@@ -100,7 +101,7 @@ class PageCycles:
         """A row for each tenth of the cycles."""
         rows = []
         with sync_playwright() as playwright:
-            running = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+            running = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_FLAGS)
             page = running.new_page(viewport={"width": 500, "height": 420})
             page.add_init_script(f"({COUNT})()")
             session = page.context.new_cdp_session(page)

@@ -21,6 +21,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
+from benchmarks.common.chromium_flags import GPU_FLAGS
 from benchmarks.common.machine import Machine
 from benchmarks.common.tables import Table, number, write_text
 from benchmarks.frame_sizes import SIZES, three_edits, views
@@ -38,19 +39,6 @@ from cagefield.rendering.splats.splitting import split_of
 from cagefield.scene.scene import Scene
 from field_page import FieldPage, field_page
 
-GPU_FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--ignore-gpu-blocklist",
-    "--enable-gpu",
-    "--use-angle=vulkan",
-    "--enable-features=Vulkan",
-    "--disable-vulkan-surface",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-]
 TURN_DEGREES = 0.5
 DRAWN = """([cameras]) => {
     const pixel = new Uint8Array(4);

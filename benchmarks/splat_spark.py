@@ -32,6 +32,7 @@ from PIL import Image
 from playwright.sync_api import Error as PlaywrightError
 from playwright.sync_api import sync_playwright
 
+from benchmarks.common.chromium_flags import SOFTWARE_FLAGS
 from benchmarks.common.machine import Machine
 from benchmarks.common.tables import Table, number, write_text
 from cagefield.cameras.camera import Camera
@@ -51,17 +52,6 @@ SMALL, MANY = 120, 20_000
 """Side of the oracle's pictures of more than so many splats: it visits every pixel for each of them."""
 
 BACKGROUNDS = {"white": 0xFFFFFF, "black": 0}
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-    "--hide-scrollbars",
-]
 NOTES = (
     "PSNR in dB of our pictures, on white or on black, the lower, 99 at most.",
     "`oracle`: against `reference_rasterizer.py` in float64, whole pictures of the same view with `side`"
@@ -191,7 +181,9 @@ def spark(modules: Path) -> Iterator[Spark]:
     if chromium is None:
         raise SystemExit("no chromium on this machine; install it")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        browser = playwright.chromium.launch(
+            executable_path=chromium, args=[*SOFTWARE_FLAGS, "--hide-scrollbars"]
+        )
         page = browser.new_page(viewport={"width": SIZE, "height": SIZE})
         page.on("pageerror", lambda error: print(f"page: {error}"))
         with served(Path(folder)) as address:

@@ -10,18 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import pytest
+from benchmarks.common.chromium_flags import SOFTWARE_FLAGS
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-]
 
 
 @dataclass
@@ -51,7 +42,7 @@ def chromium_context(flags: Sequence[str] | None = None, **options: Any) -> Iter
         close_chromium()
     if not _running:
         playwright = sync_api.sync_playwright().start()
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_FLAGS)
         _running.append(_Running(playwright, browser, asyncio.get_running_loop()))
     running = _running[0]
     running.contexts += 1
