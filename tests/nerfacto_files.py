@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from hash_oracle import tcnn_levels
 
@@ -158,6 +157,8 @@ def write_checkpoint(
             state[f"{nets}.{index}.mlp_base.0.tcnn_encoding.params"] = table.reshape(-1)
             state[f"{nets}.{index}.mlp_base.1.tcnn_encoding.params"] = flat(pair[0], garbage)
     path.parent.mkdir(parents=True, exist_ok=True)
+    import torch
+
     pipeline = {name: torch.from_numpy(value.copy()) for name, value in state.items()}
     torch.save({"step": 9, "pipeline": pipeline, "optimizers": {}, "schedulers": {}, "scalers": {}}, path)
     return path

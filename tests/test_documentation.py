@@ -91,7 +91,7 @@ def resolved(name: str) -> object:
 
 def lacks_torch(name: str) -> bool:
     """Whether a name needs PyTorch (extra nerf) and PyTorch is not installed."""
-    return ".nerf." in name and importlib.util.find_spec("torch") is None
+    return (".nerf." in name or ".torch_" in name) and importlib.util.find_spec("torch") is None
 
 
 def promised_names() -> list[str]:

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
+
 import ngp_files as files
 from cagefield.cameras.camera import Camera
 from cagefield.errors import FieldError
@@ -22,8 +24,6 @@ from cagefield.formats.external.checkpoint import ExternalCheckpoint
 from cagefield.formats.external.read_external import read_external
 from cagefield.rendering.external.external_renderer import ExternalRenderer
 from hash_oracle import PHASE, harmonics, perceptron, sigmoid, tcnn_features, tcnn_levels
-
-torch = pytest.importorskip("torch")
 
 Array = np.ndarray[Any, Any]
 

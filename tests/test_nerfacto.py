@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch")
+torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
 import nerfacto_files as files  # noqa: E402
 from cagefield.cameras.camera import Camera  # noqa: E402
