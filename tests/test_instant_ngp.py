@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
+pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
+
+import torch
 
 import ngp_files as files
 from cagefield.cameras.camera import Camera
