@@ -73,6 +73,7 @@ def start(device: str = "auto", *, double: bool = False) -> str:
                 cpu_max_num_threads=parts(),
                 offline_cache_file_path=str(cache or ""),
                 cfg_optimization=False,
+                advanced_optimization=False,
                 log_level="error",
                 enable_fallback=False,
             )
