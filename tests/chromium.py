@@ -12,6 +12,9 @@ from typing import Any
 import pytest
 from benchmarks.common.chromium_flags import SOFTWARE_FLAGS
 
+FLAGS = (*SOFTWARE_FLAGS, "--disable-frame-rate-limit")
+"""Without a limit, since Chromium draws pages lower than about 90 pixels once a second otherwise."""
+
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
 
@@ -42,7 +45,7 @@ def chromium_context(flags: Sequence[str] | None = None, **options: Any) -> Iter
         close_chromium()
     if not _running:
         playwright = sync_api.sync_playwright().start()
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_FLAGS)
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         _running.append(_Running(playwright, browser, asyncio.get_running_loop()))
     running = _running[0]
     running.contexts += 1
