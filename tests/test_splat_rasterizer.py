@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 from cagefield.fields import sh as harmonics
 from cagefield.rendering.splats import reference_rasterizer as reference
 from cagefield.rendering.splats.kernels.blending import T_MIN
+from cagefield.rendering.splats.kernels.projection import PACKED
 from cagefield.rendering.splats.raster_splats import DeformedSplats
 from cagefield.rendering.splats.rasterizer import (
     COLOR,
     DEPTH,
     NORMALS,
+    Buffers,
     intrinsics,
+    pairs_of_tiles,
     project,
     tiled,
     untiled,
@@ -324,3 +327,43 @@ def test_tiles_are_the_picture_cut_up() -> None:
     assert tiles.shape == (3 * 4, 3, 256)
     assert tiles[5, 2, 16 * 7 + 9] == picture[16 + 7, 16 + 9, 2]
     np.testing.assert_array_equal(untiled(tiles, 50, 35), picture)
+
+
+def test_pairs_are_those_of_one_part_for_every_number_of_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parts of the splats, near to far, share the tests of tiles; a tile's splats stay in order of depth."""
+    rng = np.random.default_rng(4)
+    count, across, down = 3_000, 9, 7
+    packed = np.zeros((count, PACKED), np.float32)
+    packed[:, 0], packed[:, 1] = rng.uniform(0, 16 * across, count), rng.uniform(0, 16 * down, count)
+    packed[:, 2], packed[:, 4], packed[:, 5] = (
+        0.004,
+        rng.uniform(0.002, 0.1, count),
+        rng.uniform(0.1, 1, count),
+    )
+    packed[:, 3] = rng.uniform(-1.0, 1.0, count)
+    low = np.maximum((packed[:, :2] // 16).astype(int) - rng.integers(0, 3, (count, 2)), 0)
+    high = np.minimum(low + rng.integers(0, 5, (count, 2)), [across, down])
+    tiles = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1).astype(np.int32)
+    keys = rng.uniform(1.0, 5.0, count).astype(np.float32)
+    monkeypatch.setattr("cagefield.rendering.splats.rasterizer.MIN_PART_TILES", 1)
+    found = []
+    for parts in (1, 2, 7):
+        monkeypatch.setattr("cagefield.compute.devices.parts", lambda parts=parts: parts)
+        order, starts, ids, firsts, slots, pairs = pairs_of_tiles(
+            np.arange(count), keys, tiles, packed, False, 16 * across, 16 * down, Buffers()
+        )
+        found.append((order, starts, ids[:pairs].copy(), firsts, slots[:pairs].copy()))
+    order, starts, ids, firsts, slots = found[0]
+    assert starts[-1] == firsts[-1] == len(ids) > 2_000
+    np.testing.assert_array_equal(np.sort(slots), np.arange(len(ids)))
+    for q in (0, 1_000, 2_999):
+        assert set(ids[slots[firsts[q] : firsts[q + 1]]]) <= {order[q]}
+    for t in range(across * down):
+        of_tile = ids[starts[t] : starts[t + 1]]
+        assert (np.diff(keys[of_tile]) >= 0).all()
+        x, y = t % across, t // across
+        box = tiles[of_tile]
+        assert ((box[:, 0] <= x) & (x < box[:, 1]) & (box[:, 2] <= y) & (y < box[:, 3])).all()
+    for other in found[1:]:
+        for one, two in zip(found[0], other, strict=True):
+            np.testing.assert_array_equal(one, two)

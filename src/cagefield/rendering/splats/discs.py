@@ -33,7 +33,7 @@ _NO_NORMALS: Float32 = np.empty((0, 3), np.float32)
 
 @dataclass(frozen=True, eq=False)
 class DiscProjection:
-    """The pairs (tile, disc) of one picture, near to far within each tile; see `tile_binning.bin_pairs`.
+    """The pairs (tile, disc) of one picture, near to far within each tile; see `rasterizer.pairs_of_tiles`.
 
     `camera` sees the picture, of which `region` is projected.
     """

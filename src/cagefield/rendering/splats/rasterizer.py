@@ -17,6 +17,7 @@ from scipy.special import spence
 
 from cagefield.cameras import lenses
 from cagefield.cameras.camera import Camera
+from cagefield.compute import devices
 from cagefield.rendering.splats.kernels import blending, projection, tile_binning
 from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE_PX
 from cagefield.rendering.splats.kernels.splat_args import CameraArgs, ProjectedSplats
@@ -35,6 +36,9 @@ _TO_OPENCV = np.diag([1.0, -1.0, -1.0])
 
 _GRAZING = 0.05
 """A fisheye's picture reaches this cosine to its axis at most: splats are drawn in front of it alone."""
+
+MIN_PART_TILES = 20_000
+"""Minimum number of tiles that a thread tests at a time: waking one costs microseconds."""
 
 OUTSIDE = 0.3
 """How far outside the picture, in shares of its half-size, a splat's shape still follows where it is."""
@@ -73,7 +77,7 @@ class Intrinsics:
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """The pairs (tile, splat) of one picture, near to far within each tile; see `bin_pairs`."""
+    """The pairs (tile, splat) of one picture, near to far within each tile; see `pairs_of_tiles`."""
 
     packed: Float32
     order: NDArray[np.int64]
@@ -249,18 +253,30 @@ def pairs_of_tiles(
 ]:
     """(order, starts, ids, firsts, slots, pairs): the splats or discs `shown`, near to far in each tile.
 
-    `keys` [N] sort them, `tiles` [N,4] are their boxes of tiles; results as `tile_binning.bin_pairs`.
+    `keys` [N] sort them, `tiles` [N,4] are their boxes of tiles. ids[starts[t]:starts[t+1]] are the splats of
+    tile t; slots[firsts[q]:firsts[q+1]] are the places in `ids` of the splat order[q]; `pairs` is the number
+    of both.
     """
     every = shown.astype(np.int64)
     order = every[np.argsort(keys[every])]
-    boxes = tiles[every]
-    most = int(((boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2])).sum(dtype=np.int64))
+    boxes = tiles[order]
+    areas = np.cumsum((boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2]), dtype=np.int64)
+    most = int(areas[-1]) if len(areas) else 0
     across, down = -(-width // TILE_PX), -(-height // TILE_PX)
-    starts = np.empty(across * down + 1, np.int64)
-    firsts = np.empty(len(order) + 1, np.int64)
-    ids, slots = buffers.take("ids", (most,), np.int32), buffers.take("slots", (most,), np.int32)
-    pairs = tile_binning.bin_pairs(order, tiles, packed, discs, across, starts, ids, firsts, slots)
-    return order, starts, ids, firsts, slots, pairs
+    ids, slots, found = (buffers.take(name, (most,), np.int32) for name in ("ids", "slots", "found"))
+    # Parts with about as many tiles to test each.
+    parts = max(1, min(devices.parts(), most // MIN_PART_TILES))
+    bounds = np.searchsorted(areas, most * np.arange(parts + 1) // parts)
+    bounds[[0, -1]] = 0, len(order)
+    places = np.append(0, areas)[bounds]
+    counts = np.zeros((parts, across * down), np.int64)
+    firsts = np.zeros(len(order) + 1, np.int64)
+    tile_binning.find_pairs(bounds, order, tiles, packed, discs, across, places, found, counts, firsts[1:])
+    np.cumsum(firsts, out=firsts)
+    starts = np.append(0, np.cumsum(counts.sum(axis=0)))
+    fill = starts[:-1] + np.cumsum(counts, axis=0) - counts
+    tile_binning.sort_pairs(bounds, order, places, found, firsts, fill, ids, slots)
+    return order, starts, ids, firsts, slots, int(firsts[-1])
 
 
 def world_to_camera(camera: Camera) -> NDArray[np.float64]:

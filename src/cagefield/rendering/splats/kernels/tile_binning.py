@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cagefield.compute.numba_cache import FAST, njit
+from cagefield.compute.parallel_kernels import parallel_njit
 from cagefield.rendering.splats.kernels.projection import ALPHA_MIN, TILE_PX, clamped
 
 FILTER = 0.25
@@ -66,38 +67,46 @@ def disc_overlaps(p, across, down):
     return least * 0.9999 < reach * most * most
 
 
-@njit(**FAST)
-def bin_pairs(order, tiles, packed, discs, across, starts, ids, firsts, slots):
-    """Pairs (tile, splat), near to far within each tile, by a counting sort; returns their number.
+@parallel_njit(lambda bounds, *_: len(bounds) - 1, **FAST)
+def find_pairs(begin, end, bounds, order, tiles, packed, discs, across, places, found, counts, numbers):
+    """Pairs (tile, splat) of parts of the splats, near to far: the first half of a counting sort.
 
-    `discs`: the packed elements are discs.
-    `ids[starts[t]:starts[t+1]]` are the splats of tile t; `slots[firsts[q]:firsts[q+1]]` are the places in
-    `ids` of the splat order[q].
+    Part p holds the splats order[bounds[p]:bounds[p+1]]. Its pairs' tiles stand one after the other in
+    `found` from places[p] on; counts[p, t] is its number of pairs of tile t, numbers[q] that of the splat
+    order[q]. `discs`: the packed elements are discs.
     """
-    starts[:] = 0
-    n = 0
-    for q in range(order.size):
-        i = order[q]
-        firsts[q] = n
-        x0, x1, y0, y1 = tiles[i, 0], tiles[i, 1], tiles[i, 2], tiles[i, 3]
-        single = (x1 - x0) * (y1 - y0) == 1
-        for y in range(y0, y1):
-            for x in range(x0, x1):
-                touched = single
-                if not single:
-                    touched = disc_overlaps(packed[i], x, y) if discs else overlaps(packed[i], x, y)
-                if touched:
-                    slots[n] = y * across + x
-                    starts[y * across + x + 1] += 1
-                    n += 1
-    firsts[order.size] = n
-    for t in range(starts.size - 1):
-        starts[t + 1] += starts[t]
-    fill = starts.copy()
-    for q in range(order.size):
-        for e in range(firsts[q], firsts[q + 1]):
-            t = slots[e]
-            ids[fill[t]] = order[q]
-            slots[e] = fill[t]
-            fill[t] += 1
-    return n
+    for part in range(begin, end):
+        n = places[part]
+        for q in range(bounds[part], bounds[part + 1]):
+            i = order[q]
+            first = n
+            x0, x1, y0, y1 = tiles[i, 0], tiles[i, 1], tiles[i, 2], tiles[i, 3]
+            single = (x1 - x0) * (y1 - y0) == 1
+            for y in range(y0, y1):
+                for x in range(x0, x1):
+                    touched = single
+                    if not single:
+                        touched = disc_overlaps(packed[i], x, y) if discs else overlaps(packed[i], x, y)
+                    if touched:
+                        found[n] = y * across + x
+                        counts[part, y * across + x] += 1
+                        n += 1
+            numbers[q] = n - first
+
+
+@parallel_njit(lambda bounds, *_: len(bounds) - 1, **FAST)
+def sort_pairs(begin, end, bounds, order, places, found, firsts, fill, ids, slots):
+    """Places of the pairs of `find_pairs` by tile: the second half of the counting sort.
+
+    fill[p, t] is the first place in `ids` of the pairs of part p and tile t. slots[firsts[q]:firsts[q+1]]
+    become the places in `ids` of the splat order[q].
+    """
+    for part in range(begin, end):
+        n = places[part]
+        for q in range(bounds[part], bounds[part + 1]):
+            for e in range(firsts[q], firsts[q + 1]):
+                place = fill[part, found[n]]
+                fill[part, found[n]] += 1
+                ids[place] = order[q]
+                slots[e] = place
+                n += 1
