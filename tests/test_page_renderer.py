@@ -64,7 +64,7 @@ def turned(page: EditorPage, by: tuple[float, float]) -> tuple[NDArray[np.float6
 def test_the_page_draws_the_view_that_is_turned(server: EditorServer, scene: Path) -> None:
     with editor_page(asking(server.link, "page"), *SIDES) as page:
         page.ready()
-        page.press("n", "o")  # room for the picture, and no cages on it
+        page.press("n", "Shift+O")  # room for the picture, and no cages on it
         page.until("cagefield.page.why === null && cagefield.page.draws")
         page.settle()
         still = shot(page)
@@ -104,7 +104,7 @@ def test_software_and_addresses_leave_it_to_the_server(server: EditorServer) -> 
 def test_fingers_turn_shift_and_pinch(server: EditorServer) -> None:
     with editor_page(asking(server.link, "page"), *SIDES, touch=True) as page:
         page.ready()
-        page.press("n", "o")
+        page.press("n", "Shift+O")
         page.until("cagefield.page.draws")
         page.settle()
         hand = Hand(page.page)
@@ -118,13 +118,13 @@ def test_fingers_turn_shift_and_pinch(server: EditorServer) -> None:
             c2w = np.array(page.page.evaluate("cagefield.camera.c2w")).reshape(4, 4)
             return c2w[:3, 3], -c2w[:3, 2]
 
-        eye, ahead = moved([(200, 230)], [(203, 230)])
-        turned, other = moved([(200, 230)], [(280, 230)])
+        eye, ahead = moved([(200, 150)], [(203, 150)])
+        turned, other = moved([(200, 150)], [(280, 150)])
         assert np.dot(ahead, other) < 0.95 and not np.allclose(eye, turned)
-        shifted, same = moved([(150, 230), (250, 230)], [(150, 180), (250, 180)])
+        shifted, same = moved([(150, 160), (250, 160)], [(150, 130), (250, 130)])
         np.testing.assert_allclose(same, other, atol=1e-3)
         assert abs(np.dot(shifted - turned, other)) < 0.1 * np.linalg.norm(shifted - turned)
-        near, same = moved([(150, 230), (250, 230)], [(100, 230), (300, 230)])
+        near, same = moved([(150, 150), (250, 150)], [(100, 150), (300, 150)])
         np.testing.assert_allclose(same, other, atol=1e-3)
         assert np.dot(near - shifted, other) > 0.9 * np.linalg.norm(near - shifted) > 0.1
 
@@ -161,7 +161,7 @@ def test_splats_are_drawn_by_the_page(tmp_path: Path) -> None:
     (tmp_path / "half.yaml").write_text(HALF)
     with editor_server(scene) as server, editor_page(asking(server.link, "page"), *SIDES) as page:
         page.ready()
-        page.press("n", "o")
+        page.press("n", "Shift+O")
         page.until("cagefield.page.why === null && cagefield.page.draws")
         page.settle()
         own, whole = turned(page, (90.0, 15.0))
