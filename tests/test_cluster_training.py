@@ -133,7 +133,7 @@ def test_a_cluster_goes_on_with_the_blocks_of_an_interrupted_training(
     monkeypatch.setattr("cagefield.cluster.tasks.run_tasks", here)
     monkeypatch.setattr("cagefield.cluster.connection.check_installed", lambda: None)
     assert train(street, tmp_path / "scene", "--blocks", 2, "--cluster", 3, "--resume") == 0
-    assert trained == ["block 2"]
+    assert trained == ["block 2", "block 1, refinement", "block 2, refinement"]
     assert_same_splats(field_of(tmp_path / "scene"), field_of(tmp_path / "whole"))
     assert "block 2: done" in capsys.readouterr().err
 

@@ -9,8 +9,9 @@ of the region; neighbors share the photos of the overlap.
 
 Content farther from all cameras than `FAR_DEPTHS` median depths, the sky for example, belongs to no block: it
 is the scaffold's (`scaffold`), which all photos train. Each block is trained by itself (`train_blocks`), with
-the scaffold's splats around it. The merged field takes of each block the splats whose means lie in its core
-and near cameras, and of the scaffold those in no block.
+the scaffold's splats around it; then its own splats, whose means lie in its core and near cameras, are
+refined among those of its neighbors. The merged field has each block's own splats, and the scaffold's in no
+block.
 
 Source: the division follows VastGaussian (Lin et al. 2024, section 4), with visibility from the points of
 the reconstruction.
@@ -68,6 +69,10 @@ class Block:
     def contains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
         """Mask [N] of positions [N,3] in the core and not far."""
         return self._near(inside_cell(self.core, positions), positions)
+
+    def own(self, field: SplatField) -> SplatField:
+        """The splats of a field whose means it contains."""
+        return field.take(self.contains(field.means))
 
     def trains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
         """Mask [N] of positions [N,3] in the region and not far."""
@@ -242,28 +247,29 @@ def left_out(dataset: Dataset, blocks: Sequence[Block]) -> tuple[str, ...]:
     return tuple(view.name for n, view in enumerate(dataset.train) if n not in used)
 
 
-def merge(blocks: Sequence[Block], fields: Sequence[SplatField], scaffold: SplatField | None) -> SplatField:
-    """The field of all blocks: of each block's field the splats that it contains, of the scaffold the others.
+def merge(blocks: Sequence[Block], fields: Sequence[SplatField], scaffold: SplatField) -> SplatField:
+    """The field of all blocks: each block's own splats, of the scaffold those that no block contains.
 
-    The fields agree in everything but their splats. Without a `scaffold`, that of one block is the field.
+    The fields agree in everything but their splats.
 
     Raises:
-        CagefieldError: no block contains a splat of its field.
+        CagefieldError: no block has a splat.
     """
-    if scaffold is None:
-        return fields[0]
-    kept = [field.take(block.contains(field.means)) for block, field in zip(blocks, fields, strict=True)]
-    if not any(len(part) for part in kept):
+    if not any(len(part) for part in fields):
         raise CagefieldError("the blocks have no splats in their cores; give fewer --blocks")
     left = np.ones(len(scaffold), bool)
     for block in blocks:
         left &= ~block.contains(scaffold.means)
-    kept.append(scaffold.take(left))
+    return concatenate([*fields, scaffold.take(left)])
+
+
+def concatenate(fields: Sequence[SplatField]) -> SplatField:
+    """The splats of all fields as one, which has the last field's other values."""
     return replace(
-        scaffold,
-        means=np.concatenate([part.means for part in kept]),
-        log_scales=np.concatenate([part.log_scales for part in kept]),
-        quaternions=np.concatenate([part.quaternions for part in kept]),
-        opacities=np.concatenate([part.opacities for part in kept]),
-        sh=np.concatenate([part.sh for part in kept]),
+        fields[-1],
+        means=np.concatenate([part.means for part in fields]),
+        log_scales=np.concatenate([part.log_scales for part in fields]),
+        quaternions=np.concatenate([part.quaternions for part in fields]),
+        opacities=np.concatenate([part.opacities for part in fields]),
+        sh=np.concatenate([part.sh for part in fields]),
     )
