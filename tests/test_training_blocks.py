@@ -17,6 +17,7 @@ from cagefield.training.splats.blocks import (
     FAR_DEPTHS,
     MIN_BLOCK_POINTS,
     MIN_PHOTO_SHARE,
+    NEAREST_PHOTOS,
     Block,
     block_dataset,
     divide,
@@ -95,19 +96,28 @@ def street(dataset: Dataset, seed: int = 3) -> SparsePoints:
 
 
 def test_photos_that_see_enough_of_a_block_are_chosen(capture: Dataset) -> None:
-    """Oracle: counts by loops over points and names."""
+    """Oracle: counts by loops over points and names, and the nearest photos of each point by sorting."""
     points = street(capture)
     blocks = divide(capture, points, 3)
     chosen: dict[int, set[int]] = {n: set() for n in range(3)}
+    origins = {view.name: view.camera.origin for view in capture.train}
+    nearest = [
+        sorted(names & set(origins), key=lambda name: float(np.linalg.norm(origins[name] - position)))[:4]
+        for position, names in zip(points.positions, points.seen_by, strict=True)
+    ]
+    assert NEAREST_PHOTOS == 4
     for n, view in enumerate(capture.train):
-        counts = [0, 0, 0]
+        counts, close = [0, 0, 0], [0, 0, 0]
         for number, block in enumerate(blocks):
-            for position, names in zip(points.positions, points.seen_by, strict=True):
+            for position, names, four in zip(points.positions, points.seen_by, nearest, strict=True):
                 inside = all(block.region[0] <= position) and all(position < block.region[1])
                 counts[number] += inside and view.name in names
+                close[number] += inside and view.name in four
         total = sum(view.name in names for names in points.seen_by)
         for number, count in enumerate(counts):
-            if count >= MIN_BLOCK_POINTS and (count >= MIN_PHOTO_SHARE * total or count == max(counts)):
+            if count >= MIN_BLOCK_POINTS and (
+                count >= MIN_PHOTO_SHARE * total or count == max(counts) or close[number] >= MIN_BLOCK_POINTS
+            ):
                 chosen[number].add(n)
     assert [set(block.photos) for block in blocks] == list(chosen.values())
     assert 1 < len(chosen[0]) < len(capture.train)
@@ -121,6 +131,35 @@ def test_photos_that_see_enough_of_a_block_are_chosen(capture: Dataset) -> None:
         assert part.points is not None
         np.testing.assert_array_equal(part.points.positions, points.positions[both])
     assert sum(block.core_points for block in blocks) == len(points)
+
+
+def test_a_background_is_trained_by_the_photos_that_see_it_best(capture: Dataset) -> None:
+    """A thing between two walls: each photo sees much of the thing, and few points of the wall behind it.
+
+    The block of a wall takes the photos that see that wall, none of which has a quarter of its points there.
+    """
+    chance = np.random.default_rng(6)
+    thing = chance.normal(0, 0.3, (600, 3))
+    walls = [chance.normal((x, 0, 0), (0.1, 0.5, 0.5), (60, 3)) for x in (-8.0, 8.0)]
+    names = [view.name for view in capture.train]
+    facing = [
+        frozenset(n for n, view in zip(names, capture.train, strict=True) if side * view.camera.origin[0] < 0)
+        for side in (-1.0, 1.0)
+    ]
+    points = SparsePoints(
+        np.concatenate([thing, *walls]),
+        np.zeros((720, 3), np.uint8),
+        (*[frozenset(names)] * 600, *[facing[0]] * 60, *[facing[1]] * 60),
+    )
+    blocks = divide(capture, points, 3)
+    assert all(4 <= len(side) < len(names) for side in facing)
+    for wall, side in zip(walls, facing, strict=True):
+        block = blocks[int(np.argmax([block.contains(wall).sum() for block in blocks]))]
+        taken = {names[n] for n in block.photos}
+        origins = {view.name: view.camera.origin for view in capture.train}
+        near = [sorted(side, key=lambda name: float(np.linalg.norm(origins[name] - p)))[:4] for p in wall]
+        best = {name for four in near for name in four if sum(name in each for each in near) >= 10}
+        assert best and best <= taken
 
 
 def test_points_of_unknown_photos_are_visible_in_the_frustum(capture: Dataset) -> None:

@@ -5,7 +5,8 @@ each photo's points weigh 1 together: the core cells of the blocks, each the con
 is half-open, [low, high) along each axis, and the outer ones reach to infinity, so that every position is in
 exactly one core; a position outside the points' box is in the core that is nearest to it. A block's region is
 its core, grown by `OVERLAP` of its extent among the points at each inner plane. Its photos see enough points
-of the region; neighbors share the photos of the overlap.
+of the region, as a share of all that they see, or are among the nearest ones of enough of its points: the
+background of an object is a small part of all photos that see it. Neighbors share the photos of the overlap.
 
 Content farther from all cameras than `FAR_DEPTHS` median depths, the sky for example, belongs to no block: it
 is the scaffold's (`scaffold`), which all photos train. Each block is trained by itself (`train_blocks`), with
@@ -38,6 +39,8 @@ MIN_BLOCK_POINTS = 10
 """Minimum number of a region's points that a photo of the block sees."""
 MIN_PHOTO_SHARE = 0.25
 """Minimum share of the points that a photo sees which are the region's."""
+NEAREST_PHOTOS = 4
+"""Number of photos, the nearest of those that see a point, that a block of the point takes even so."""
 FAR_DEPTHS = 3.0
 """Distance from the nearest camera beyond which content is far, in median distances of points from photos."""
 MAX_BLOCKS = 10_000
@@ -115,6 +118,8 @@ def divide(dataset: Dataset, points: SparsePoints, count: int) -> tuple[Block, .
     members = np.stack([inside_cell(region, points.positions) for region in regions])
     counts = np.stack([seen @ rows.astype(np.int32) for rows in members])
     chosen = (counts >= MIN_BLOCK_POINTS) & (counts >= MIN_PHOTO_SHARE * totals)
+    close = nearest_observations(dataset.train, points, seen)
+    chosen |= np.stack([close @ rows.astype(np.int32) for rows in members]) >= MIN_BLOCK_POINTS
     most = counts.argmax(axis=0)
     chosen[most, np.arange(len(totals))] |= counts.max(axis=0) >= MIN_BLOCK_POINTS
     origins = np.stack([view.camera.origin for view in dataset.train])
@@ -220,6 +225,20 @@ def visible_points(views: Sequence[View], points: SparsePoints) -> Any:
         photos = np.repeat(np.arange(len(views)), [len(part) for part in found])
         rows = np.concatenate(found)
     return csr_matrix((np.ones(len(rows), np.int32), (photos, rows)), shape=(len(views), len(points)))
+
+
+def nearest_observations(views: Sequence[View], points: SparsePoints, seen: Any) -> Any:
+    """Sparse matrix int32 [V,M] as `seen`, of each point the NEAREST_PHOTOS nearest photos."""
+    from scipy.sparse import csr_matrix
+
+    photos, rows = seen.nonzero()
+    origins = np.stack([view.camera.origin for view in views])
+    distances = np.linalg.norm(origins[photos] - points.positions[rows], axis=1)
+    order = np.lexsort((photos, distances, rows))
+    photos, rows = photos[order], rows[order]
+    rank = np.arange(len(rows)) - np.searchsorted(rows, rows)
+    near = rank < NEAREST_PHOTOS
+    return csr_matrix((np.ones(near.sum(), np.int32), (photos[near], rows[near])), shape=seen.shape)
 
 
 def _in_frustum(view: View, positions: Array) -> NDArray[np.bool_]:
