@@ -174,6 +174,7 @@ def plan_blocks(
         points = SparsePoints(np.zeros((0, 3)), np.zeros((0, 3), np.uint8))
     blocks = divide(dataset, points, count)
     jobs: list[BlockJob] = []
+    refinements: list[SplatConfig] = []
     scaffold = None
     if count > 1:
         whole = replace(scaffold_dataset(dataset), points=points)
@@ -190,33 +191,38 @@ def plan_blocks(
         )
         photos = block_dataset(dataset, points, block)
         if scaffold is not None:
-            part = _share_of(part, 1.0 - REFINEMENT_STEPS_SHARE)
+            part, last = _divided(part)
+            refinements.append(last)
         key = _key(block, part, dataset, "" if scaffold is None else scaffold.key)
         jobs.append(BlockJob(number, photos, part, folder, key, block, scaffold))
-    return blocks, tuple(jobs) if scaffold is None else _refinements(jobs)
+    return blocks, tuple(jobs) if scaffold is None else _refinements(jobs, refinements)
 
 
-def _refinements(jobs: Sequence[BlockJob]) -> tuple[BlockJob, ...]:
-    """The refinements of the blocks' first trainings."""
+def _refinements(jobs: Sequence[BlockJob], configs: Sequence[SplatConfig]) -> tuple[BlockJob, ...]:
+    """The refinements of the blocks' first trainings, with their options."""
     photos = [set() if job.block is None else set(job.block.photos) for job in jobs]
     # Only their files are read: with one photo and no points a job is small when it is sent to a worker.
     light = [
         replace(job, dataset=replace(job.dataset, train=job.dataset.train[:1], points=None)) for job in jobs
     ]
     found = []
-    for job in jobs:
+    for job, config in zip(jobs, configs, strict=True):
         near = tuple(light[n] for n in range(len(jobs)) if n != job.number and photos[n] & photos[job.number])
-        config = _share_of(job.config, REFINEMENT_STEPS_SHARE / (1.0 - REFINEMENT_STEPS_SHARE))
         content = json.dumps([job.key, [other.key for other in near], dataclasses.asdict(config)])
         key = hashlib.sha256(content.encode()).hexdigest()
         found.append(replace(job, config=config, key=key, first=light[job.number], neighbors=near))
     return tuple(found)
 
 
-def _share_of(config: SplatConfig, share: float) -> SplatConfig:
-    """Options with a share of the steps or the minutes."""
-    minutes = None if config.minutes is None else config.minutes * share
-    return replace(config, steps=max(1, round(config.steps * share)), minutes=minutes)
+def _divided(config: SplatConfig) -> tuple[SplatConfig, SplatConfig]:
+    """Options of a block's first training and of its refinement, which share its steps or minutes."""
+    first = max(1, round(config.steps * (1.0 - REFINEMENT_STEPS_SHARE)))
+    minutes = None if config.minutes is None else config.minutes * (1.0 - REFINEMENT_STEPS_SHARE)
+    rest = None if config.minutes is None else config.minutes * REFINEMENT_STEPS_SHARE
+    return (
+        replace(config, steps=first, minutes=minutes),
+        replace(config, steps=max(1, config.steps - first), minutes=rest),
+    )
 
 
 def training_stages(jobs: Sequence[BlockJob]) -> tuple[tuple[BlockJob, ...], ...]:
