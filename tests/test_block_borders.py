@@ -41,7 +41,7 @@ def scenes() -> tuple[Scene, Scene]:
     near = dataclasses.replace(ball, means=0.99 * ball.means, bounds=ball.bounds)
     inside = INNER.contains(near.means.astype(np.float64))
     assert all(0 < (inside & block.contains(near.means)).sum() < inside.sum() for block in blocks)
-    merged = merge(blocks, [near] * 4, away)
+    merged = merge(blocks, [block.own(near) for block in blocks], away)
     one = dataclasses.replace(
         near,
         **{

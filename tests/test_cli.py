@@ -92,6 +92,22 @@ def test_wrong_options_are_one_line(
     assert message in refused(capsys, *argv)
 
 
+@pytest.mark.parametrize(
+    ("argv", "named"),
+    [
+        (("import", "a.ply", "scene"), "cagefield import takes its output as -o OUT; give -o scene"),
+        (("export", "scene", "a b.ply"), "cagefield export takes its output as -o OUT; give -o a b.ply"),
+        (("import", "a.ply", "scene", "more"), "Missing from cagefield import: -o PATH"),
+        (("import", "a.ply", "--colour"), "Missing from cagefield import: -o PATH"),
+        (("import", "a.ply", "scene", "-o", "out"), "Unrecognized options: scene"),
+    ],
+)
+def test_an_output_without_its_option(
+    capsys: pytest.CaptureFixture[str], argv: tuple[str, ...], named: str
+) -> None:
+    assert named in refused(capsys, *argv)
+
+
 def test_console_script_reports_bad_input_without_traceback(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "cagefield", "info", str(tmp_path / "nowhere")],

@@ -52,7 +52,7 @@ def field_of(scene: Path) -> SplatField:
 def test_blocks_of_a_cluster_are_those_of_one_process(
     street: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A worker is killed amid its block, once it has a checkpoint; another one goes on from there."""
+    """A worker is killed amid the blocks, once one has a checkpoint; another one goes on from there."""
     from cagefield.cluster import tasks
 
     options = ("--blocks", 2)
@@ -61,10 +61,11 @@ def test_blocks_of_a_cluster_are_those_of_one_process(
     connect = tasks.connect
 
     class Killing:
-        """Context of `connect` that kills a worker as soon as a checkpoint is there."""
+        """Context of `connect` that kills a worker as soon as a block's checkpoint is there, once."""
 
         def __init__(self, *args: object) -> None:
             self.inner = connect(*args)  # type: ignore[arg-type]
+            self.ended = False
 
         def __enter__(self) -> object:
             import threading
@@ -79,12 +80,14 @@ def test_blocks_of_a_cluster_are_those_of_one_process(
         def kill(self) -> None:
             import time
 
-            while not list((tmp_path / "many.blocks").glob("*.training")):
+            while not self.ended and not killed:
+                if list((tmp_path / "many.blocks").glob("block-*.training")):
+                    os.kill(self.processes[0], signal.SIGKILL)
+                    killed.append(self.processes[0])
                 time.sleep(0.02)
-            os.kill(self.processes[0], signal.SIGKILL)
-            killed.append(self.processes[0])
 
         def __exit__(self, *args: object) -> object:
+            self.ended = True
             return self.inner.__exit__(*args)  # type: ignore[arg-type]
 
     monkeypatch.setattr(tasks, "connect", Killing)
@@ -133,7 +136,7 @@ def test_a_cluster_goes_on_with_the_blocks_of_an_interrupted_training(
     monkeypatch.setattr("cagefield.cluster.tasks.run_tasks", here)
     monkeypatch.setattr("cagefield.cluster.connection.check_installed", lambda: None)
     assert train(street, tmp_path / "scene", "--blocks", 2, "--cluster", 3, "--resume") == 0
-    assert trained == ["block 2"]
+    assert trained == ["block 2", "block 1, refinement", "block 2, refinement"]
     assert_same_splats(field_of(tmp_path / "scene"), field_of(tmp_path / "whole"))
     assert "block 2: done" in capsys.readouterr().err
 

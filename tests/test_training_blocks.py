@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cagefield.datasets.views import Dataset, SparsePoints
+from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.training.splats import train_blocks as training
@@ -16,6 +17,7 @@ from cagefield.training.splats.blocks import (
     FAR_DEPTHS,
     MIN_BLOCK_POINTS,
     MIN_PHOTO_SHARE,
+    NEAREST_PHOTOS,
     Block,
     block_dataset,
     divide,
@@ -28,7 +30,14 @@ from cagefield.training.splats.blocks import (
 from cagefield.training.splats.scaffold import scaffold_dataset
 from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.training.splats.splat_run import SplatRun
-from cagefield.training.splats.train_blocks import plan_blocks, read_block, train_block, train_blocks
+from cagefield.training.splats.train_blocks import (
+    REFINEMENT_START_PROGRESS,
+    plan_blocks,
+    read_block,
+    train_block,
+    train_blocks,
+    training_stages,
+)
 from cagefield.training.splats.train_splats import train_splat
 from splat_captures import around, as_dataset, painted_ball, photos_of, points_near, write_views
 
@@ -87,19 +96,28 @@ def street(dataset: Dataset, seed: int = 3) -> SparsePoints:
 
 
 def test_photos_that_see_enough_of_a_block_are_chosen(capture: Dataset) -> None:
-    """Oracle: counts by loops over points and names."""
+    """Oracle: counts by loops over points and names, and the nearest photos of each point by sorting."""
     points = street(capture)
     blocks = divide(capture, points, 3)
     chosen: dict[int, set[int]] = {n: set() for n in range(3)}
+    origins = {view.name: view.camera.origin for view in capture.train}
+    nearest = [
+        sorted(names & set(origins), key=lambda name: float(np.linalg.norm(origins[name] - position)))[:4]
+        for position, names in zip(points.positions, points.seen_by, strict=True)
+    ]
+    assert NEAREST_PHOTOS == 4
     for n, view in enumerate(capture.train):
-        counts = [0, 0, 0]
+        counts, close = [0, 0, 0], [0, 0, 0]
         for number, block in enumerate(blocks):
-            for position, names in zip(points.positions, points.seen_by, strict=True):
+            for position, names, four in zip(points.positions, points.seen_by, nearest, strict=True):
                 inside = all(block.region[0] <= position) and all(position < block.region[1])
                 counts[number] += inside and view.name in names
+                close[number] += inside and view.name in four
         total = sum(view.name in names for names in points.seen_by)
         for number, count in enumerate(counts):
-            if count >= MIN_BLOCK_POINTS and (count >= MIN_PHOTO_SHARE * total or count == max(counts)):
+            if count >= MIN_BLOCK_POINTS and (
+                count >= MIN_PHOTO_SHARE * total or count == max(counts) or close[number] >= MIN_BLOCK_POINTS
+            ):
                 chosen[number].add(n)
     assert [set(block.photos) for block in blocks] == list(chosen.values())
     assert 1 < len(chosen[0]) < len(capture.train)
@@ -113,6 +131,35 @@ def test_photos_that_see_enough_of_a_block_are_chosen(capture: Dataset) -> None:
         assert part.points is not None
         np.testing.assert_array_equal(part.points.positions, points.positions[both])
     assert sum(block.core_points for block in blocks) == len(points)
+
+
+def test_a_background_is_trained_by_the_photos_that_see_it_best(capture: Dataset) -> None:
+    """A thing between two walls: each photo sees much of the thing, and few points of the wall behind it.
+
+    The block of a wall takes the photos that see that wall, none of which has a quarter of its points there.
+    """
+    chance = np.random.default_rng(6)
+    thing = chance.normal(0, 0.3, (600, 3))
+    walls = [chance.normal((x, 0, 0), (0.1, 0.5, 0.5), (60, 3)) for x in (-8.0, 8.0)]
+    names = [view.name for view in capture.train]
+    facing = [
+        frozenset(n for n, view in zip(names, capture.train, strict=True) if side * view.camera.origin[0] < 0)
+        for side in (-1.0, 1.0)
+    ]
+    points = SparsePoints(
+        np.concatenate([thing, *walls]),
+        np.zeros((720, 3), np.uint8),
+        (*[frozenset(names)] * 600, *[facing[0]] * 60, *[facing[1]] * 60),
+    )
+    blocks = divide(capture, points, 3)
+    assert all(4 <= len(side) < len(names) for side in facing)
+    for wall, side in zip(walls, facing, strict=True):
+        block = blocks[int(np.argmax([block.contains(wall).sum() for block in blocks]))]
+        taken = {names[n] for n in block.photos}
+        origins = {view.name: view.camera.origin for view in capture.train}
+        near = [sorted(side, key=lambda name: float(np.linalg.norm(origins[name] - p)))[:4] for p in wall]
+        best = {name for four in near for name in four if sum(name in each for each in near) >= 10}
+        assert best and best <= taken
 
 
 def test_points_of_unknown_photos_are_visible_in_the_frustum(capture: Dataset) -> None:
@@ -139,13 +186,14 @@ def test_merged_splats_are_those_that_blocks_contain_and_the_scaffolds_elsewhere
         fields.append(dataclasses.replace(ball, means=moved, bounds=ball.bounds))
     reach = float(np.median(np.linalg.norm(fields[2].means, axis=1)))
     blocks = [dataclasses.replace(block, cameras=np.zeros((1, 3)), reach=reach) for block in halves()]
-    found = merge(blocks, fields[:2], fields[2])
+    own = [block.own(field) for block, field in zip(blocks, fields[:2], strict=True)]
+    found = merge(blocks, own, fields[2])
     near = [np.linalg.norm(field.means.astype(float), axis=1) < reach for field in fields]
     rows = [inside_cell(block.core, field.means) for block, field in zip(blocks, fields[:2], strict=True)]
     expected = [fields[0].means[rows[0] & near[0]], fields[1].means[rows[1] & near[1]]]
     np.testing.assert_array_equal(found.means, np.concatenate([*expected, fields[2].means[~near[2]]]))
     assert all(len(part) for part in expected) and 0 < near[2].sum() < 80
-    half = merge(blocks[:1], fields[:1], fields[2])
+    half = merge(blocks[:1], own[:1], fields[2])
     rest = ~(inside_cell(blocks[0].core, fields[2].means) & near[2])
     np.testing.assert_array_equal(half.means, np.concatenate([expected[0], fields[2].means[rest]]))
 
@@ -182,9 +230,10 @@ def test_blocks_have_equal_shares_of_the_photos_points(capture: Dataset) -> None
 
 
 def test_a_block_is_trained_among_frozen_splats_of_the_scaffold(capture: Dataset, tmp_path: Path) -> None:
-    blocks, jobs = plan_blocks(capture, QUICK, 2, tmp_path)
-    scaffold = jobs[0].scaffold
-    assert scaffold is not None and scaffold is jobs[1].scaffold
+    blocks, last = plan_blocks(capture, QUICK, 2, tmp_path)
+    (scaffold,), jobs, refinements = training_stages(last)
+    assert refinements == last and scaffold is jobs[0].scaffold is jobs[1].scaffold
+    assert jobs[0].seeds() is None
     assert (scaffold.config.steps, scaffold.config.splats) == (18, 100)
     with pytest.raises(CagefieldError, match=r"scaffold\.safetensors is not there; the folder must be"):
         jobs[0].context()
@@ -206,6 +255,62 @@ def test_a_block_is_trained_among_frozen_splats_of_the_scaffold(capture: Dataset
     np.testing.assert_array_equal(run.gains, context.gains)
     assert len(run.field()) == len(run.state) - frozen <= jobs[0].config.splats
     assert np.isfinite(run.running_loss)
+
+
+def test_a_refinement_begins_with_the_blocks_own_splats_among_its_neighbors(
+    capture: Dataset, tmp_path: Path
+) -> None:
+    """Three blocks along x; those at the ends share no photos. Fields and scaffold are random splats."""
+    points = street(capture)
+    seen = dataclasses.replace(capture, points=points)
+    blocks, jobs = plan_blocks(seen, QUICK, 3, tmp_path)
+    photos = [set(block.photos) for block in blocks]
+    assert photos[0] & photos[1] and photos[1] & photos[2] and not photos[0] & photos[2]
+    assert [[job.number for job in refined.neighbors] for refined in jobs] == [[1], [0, 2], [1]]
+    (scaffold,), first, _ = training_stages(jobs)
+    assert [job.config.steps + last.config.steps for job, last in zip(first, jobs, strict=True)] == [
+        round(60 * len(block.photos) / len(capture.train)) for block in blocks
+    ]
+    chance, fields = np.random.default_rng(2), []
+    with pytest.raises(CagefieldError, match=r"block-0001\.safetensors is not there"):
+        jobs[0].seeds()
+    for job in (scaffold, *first):
+        ball = painted_ball(300)
+        low, high = points.positions.min(axis=0), points.positions.max(axis=0)
+        means = chance.uniform(low, high, (len(ball), 3)).astype(np.float32)
+        fields.append(dataclasses.replace(ball, means=means, bounds=ball.bounds))
+        fields[-1].save(job.path(".safetensors"))
+        gains = chance.uniform(0.8, 1.2, (job.photo_count, 3)).astype(np.float32)
+        record = {"key": job.key, "steps": 3, "seconds": 1.0, "gains": gains.tolist()}
+        job.path(".json").write_text(json.dumps(record), encoding="utf-8")
+    context, seeds = jobs[0].context(), jobs[0].seeds()
+    assert context is not None and seeds is not None
+    np.testing.assert_array_equal(seeds.state.means, fields[1].means[blocks[0].contains(fields[1].means)])
+    assert not seeds.state.frozen.any() and not any(depths.any() for depths in seeds.free_space)
+    # the scaffold's splats where neither block is, and the neighbor's own
+    elsewhere = ~blocks[0].contains(fields[0].means) & ~blocks[1].contains(fields[0].means)
+    around = np.concatenate(
+        [fields[0].means[elsewhere], fields[2].means[blocks[1].contains(fields[2].means)]]
+    )
+    shown = [[_in_margin(view, mean) for view in jobs[0].dataset.train] for mean in around]
+    np.testing.assert_array_equal(context.frozen.means, around[np.any(shown, axis=1)])
+    before, frozen = seeds.state.sh.copy(), context.frozen
+    run = SplatRun(jobs[0].dataset, jobs[0].config, seeds, context)
+    assert run.done == pytest.approx(REFINEMENT_START_PROGRESS)
+    assert len(run.state) == len(before) + len(frozen)
+    while run.done < 1.0:
+        run.advance()
+    assert run.step == jobs[0].config.steps and run.progress().seconds_left == 0.0
+    np.testing.assert_array_equal(run.state.means[run.state.frozen], frozen.means)
+    assert run.state.sh[~run.state.frozen].shape == before.shape
+    assert (run.state.sh[~run.state.frozen] != before).any()
+
+
+def _in_margin(view: View, mean: np.ndarray) -> bool:
+    """Whether a point lies in front of the camera, in the photo or a quarter of its size around it."""
+    (x, y), depth = (values[0] for values in view.camera.project(mean[None].astype(np.float64)))
+    width, height = view.camera.width, view.camera.height
+    return bool(depth > 0 and -0.25 * width <= x < 1.25 * width and -0.25 * height <= y < 1.25 * height)
 
 
 @pytest.mark.parametrize(
@@ -247,11 +352,13 @@ def test_finished_blocks_are_not_trained_again(
 ) -> None:
     blocks, jobs = plan_blocks(capture, QUICK, 2, tmp_path)
     whole = train_blocks(capture, blocks, jobs, evaluate=False)
-    trained = [done for job in (jobs[0].scaffold, *jobs) if job and (done := read_block(job))]
-    assert len(trained) == 3 and sum(len(done.field) for done in trained) > len(whole.field) > 0
+    trained = [done for stage in training_stages(jobs) for job in stage if (done := read_block(job))]
+    assert len(trained) == 5 and sum(len(done.field) for done in trained) > len(whole.field) > 0
+    refined = [done.field.means for done in trained[3:]]
+    np.testing.assert_array_equal(whole.field.means[: sum(map(len, refined))], np.concatenate(refined))
     assert whole.steps == sum(done.steps for done in trained)
     np.testing.assert_array_equal(whole.gains, trained[0].gains)
-    for path in jobs[1].folder.glob("block-0002*"):
+    for path in jobs[1].folder.glob("*-0002*"):
         path.unlink()
     began: list[str] = []
 
@@ -261,12 +368,12 @@ def test_finished_blocks_are_not_trained_again(
 
     monkeypatch.setattr(training, "train_block", counted)
     again = train_blocks(capture, blocks, jobs, evaluate=False)
-    assert began == ["block 2"] and same(again.field, whole.field)
+    assert began == ["block 2", "block 2, refinement"] and same(again.field, whole.field)
     other = plan_blocks(capture, dataclasses.replace(QUICK, seed=5), 2, tmp_path)[1]
     with pytest.raises(CagefieldError, match="is of other photos or options; give those of the first run"):
         read_block(other[0])
     jobs[0].path(".json").write_text("{", encoding="utf-8")
-    with pytest.raises(CagefieldError, match=r"is damaged .* remove it to train block 1 again"):
+    with pytest.raises(CagefieldError, match=r"is damaged .* remove it to train block 1, refinement again"):
         read_block(jobs[0])
 
 

@@ -4,11 +4,11 @@
     python -m benchmarks.captures.compare_blocks STREET -o FOLDER [--blocks 4] [--steps-per-photo 20]
         [--processes 1]
 
-Both get as many steps for each photo; the scaffold and each block in a process of its own, so many at a time.
-FOLDER gets a Markdown row for each, figures.md, and pictures of test views that see points of several cores:
-photo, one training, blocks, and their difference, four times as strong around gray. A command that is given
-again goes on; remove the folder to measure anew. Processor time is the sum over all processes, peak memory
-that of the largest.
+Poses are verified as `cagefield train` does. Both get as many steps for each photo; the scaffold, each block
+and each refinement in a process of its own, so many at a time. FOLDER gets a Markdown row for each,
+figures.md, and pictures of test views that see points of several cores: photo, one training, blocks, and
+their difference, four times as strong around gray. A command that is given again goes on; remove the folder
+to measure anew. Processor time is the sum over all processes, peak memory that of the largest.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import numpy as np
 from benchmarks.common.machine import cpu_model
 from cagefield.compute import devices
 from cagefield.datasets import load_dataset
+from cagefield.datasets.sfm.pose_verification import poses_cache_folder, verify_poses
 from cagefield.datasets.sfm.sparse_points import points_cache_folder, starting_points
 from cagefield.datasets.views import Dataset, View
 from cagefield.fields.splat_field import SplatField
@@ -37,6 +38,7 @@ from cagefield.training.splats.train_blocks import (
     read_block,
     train_block,
     train_blocks,
+    training_stages,
 )
 
 HEADER = (
@@ -62,10 +64,10 @@ def main() -> None:
     for count in (1, options.blocks):
         kept = options.out / f"row-{count}.md"
         if not kept.exists():
-            numbers = [-1, *range(count)] if count > 1 else [0]
-            for group in (numbers[:1], numbers[1:]):
+            for stage, size in enumerate((1, count, count) if count > 1 else (1,)):
                 with multiprocessing.get_context("spawn").Pool(options.processes, maxtasksperchild=1) as pool:
-                    pool.starmap(train_one, [(options, count, number) for number in group], chunksize=1)
+                    jobs = [(options, count, stage, number) for number in range(size)]
+                    pool.starmap(train_one, jobs, chunksize=1)
             kept.write_text(measure(options, count) + "\n", encoding="utf-8")
         rows.append(kept.read_text(encoding="utf-8").rstrip("\n"))
         print(rows[-1], flush=True)
@@ -74,19 +76,24 @@ def main() -> None:
     draw(options)
 
 
+def load(options: Any) -> Dataset:
+    """The capture with verified poses, as `cagefield train` takes it; found once, then cached."""
+    dataset = load_dataset(options.capture, downscale=options.downscale)
+    return verify_poses(dataset, cache=poses_cache_folder()).dataset
+
+
 def plan(options: Any, count: int) -> tuple[Dataset, tuple[Block, ...], tuple[BlockJob, ...]]:
     """The capture with the blocks and the trainings of a comparison."""
     devices.start("cpu")
-    dataset = load_dataset(options.capture, downscale=options.downscale)
+    dataset = load(options)
     config = SplatConfig(steps=options.steps_per_photo * len(dataset.train), splats=options.splats)
     return dataset, *plan_blocks(dataset, config, count, options.out / f"blocks-{count}")
 
 
-def train_one(options: Any, count: int, number: int) -> None:
-    """Trains a block, or the scaffold (-1), and adds its processor time and peak memory to a file."""
-    _, _, jobs = plan(options, count)
-    job = jobs[0].scaffold if number < 0 else jobs[number]
-    if job is None or read_block(job) is not None:
+def train_one(options: Any, count: int, stage: int, number: int) -> None:
+    """Trains one of a stage's trainings, and adds its processor time and peak memory to a file."""
+    job = training_stages(plan(options, count)[2])[stage][number]
+    if read_block(job) is not None:
         return
     train_block(job)
     used = resource.getrusage(resource.RUSAGE_SELF)
@@ -123,7 +130,7 @@ def measure(options: Any, count: int) -> str:
 
 def draw(options: Any) -> None:
     """Writes the pictures of the test views that see the most points on both sides of a border."""
-    dataset = load_dataset(options.capture, downscale=options.downscale)
+    dataset = load(options)
     points = starting_points(dataset, points_cache_folder())
     if points is None:
         raise SystemExit("the capture has no points")

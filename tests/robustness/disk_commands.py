@@ -6,6 +6,7 @@ import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
 
+from benchmarks.captures.street import write_street
 from torch_files import write_checkpoints
 
 from cagefield import Scene
@@ -38,6 +39,7 @@ def sources(folder: Path) -> None:
     (folder / "path.json").write_text(dump_path(keys, loop=False))
     make_scene("chair", folder / "photos", views=4, size=16, test_views=1)
     photos_alone(folder / "photos_alone")
+    write_street(folder / "street", photos=8, size=48, length=4.0)
     if importlib.util.find_spec("torch") is not None:
         write_checkpoints(folder, splats=4000)
     (folder / "e.yaml").write_text(EDITS)
@@ -97,6 +99,11 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
     "hotspot": DiskCommand("hotspot {out} --add top --at 0 0 0.5", "scene", on_disk="voxels"),
     "train, voxels": DiskCommand(_TRAIN + " --field voxel", "new"),
     "train, splats": DiskCommand("train {s}/photos -o {out} --steps 3 --field splat", "new"),
+    "train, blocks": DiskCommand(
+        "train {s}/street -o {out} --blocks 2 --steps 8 --splats 100 --keep-poses",
+        "new",
+        on_the_way=3.0,
+    ),
     "train, nerf": DiskCommand(_TRAIN + " --field nerf", "new"),
     "import": DiskCommand("import {s}/x.ply -o {out}", "new"),
     "import .tar": DiskCommand(f"import {{s}}/a.tar -o {{out}} {_BAKING}", "new"),

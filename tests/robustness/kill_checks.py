@@ -64,7 +64,7 @@ def trained_problem(folder: Path, said: int) -> str | None:
         Scene.open(folder / "new")
     except Exception as error:
         return f"unreadable: {error}"
-    if said >= 1 and (folder / "new.training").exists():
+    if said >= 1 and ((folder / "new.training").exists() or (folder / "new.blocks").exists()):
         return "lost: the training's end, its checkpoint is still there"
     return None
 

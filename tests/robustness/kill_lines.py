@@ -9,6 +9,7 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
+from benchmarks.captures.street import write_street
 from kill_checks import (
     demo_problem,
     file_problem,
@@ -145,13 +146,29 @@ def _trained(field: str) -> Command:
     def work(folder: Path, say: Say) -> None:
         from cagefield.training import loop
 
-        loop._until_next = lambda saved: 0.0
+        loop._checkpoint_interval_seconds = lambda saved: 0.0
         resumed = (folder / "new.training").is_file()
         words = f"train {folder}/photos -o {folder}/new --field {field} --steps 4 --resolution 16"
         cli(*words.split(), "--resume" if resumed else "--overwrite")
         say(1)
 
     return Command(make, work, trained_problem)
+
+
+def _put_street(folder: Path) -> None:
+    put_scene(folder)
+    write_street(folder / "street", photos=8, size=48, length=4.0)
+
+
+def _train_blocks(folder: Path, say: Say) -> None:
+    """Scaffold, two blocks and their refinements, a checkpoint after each step; goes on from there."""
+    from cagefield.training import loop
+
+    loop._checkpoint_interval_seconds = lambda saved: 0.0
+    resumed = (folder / "new.blocks").is_dir()
+    words = f"train {folder}/street -o {folder}/new --blocks 2 --steps 8 --splats 100 --keep-poses"
+    cli(*words.split(), "--resume" if resumed else "--overwrite")
+    say(1)
 
 
 _SPLATS = (".compressed.ply", ".sog", ".splat", ".glb")
@@ -218,6 +235,7 @@ SLOW_LINES: dict[str, Command] = {
     "train, voxels": _trained("voxel"),
     "train, splats": _trained("splat"),
     "train, nerf": _trained("nerf"),
+    "train, blocks": Command(_put_street, _train_blocks, trained_problem),
     "import .tar": _imported("a.tar", _BAKING),
     "import .ckpt, nerf": _imported("a.ckpt", _BAKING),
     "import .ckpt, splats": _imported("s.ckpt"),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
 import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Protocol
@@ -110,8 +111,17 @@ def parse(args: list[str]) -> Command | int:
     except SystemExit as stop:
         if not stop.code:
             return 0
-        return _refuse(_without_box(complaint.getvalue()))
+        return _refuse(_missing_output(args, complaint.getvalue()) or _without_box(complaint.getvalue()))
     return command
+
+
+def _missing_output(args: list[str], complaint: str) -> str | None:
+    """One line for a command whose output is given without -o; None for every other complaint."""
+    text = " ".join(_without_box(complaint).split())
+    found = re.search(r"Missing from (cagefield [\w-]+): -o PATH.*; Unrecognized options: ([^;]+);", text)
+    if found is None or found[2] not in args or found[2].startswith("-"):
+        return None
+    return f"{found[1]} takes its output as -o OUT; give -o {found[2]}"
 
 
 def _without_box(text: str) -> str:
@@ -122,7 +132,7 @@ def _without_box(text: str) -> str:
         words = line.strip("─╭╮╰╯│ ")
         if line.startswith("╭"):
             title = words
-        elif words:
+        elif words.strip("-"):
             paragraphs[-1] += words.rstrip(".") + " "
         elif paragraphs[-1]:
             paragraphs.append("")

@@ -276,7 +276,7 @@ class Train:
         except OSError as error:
             kept = (
                 f"the training is kept in {checkpoint}: the same command with --resume goes on from there"
-                if checkpoint.is_file()
+                if checkpoint.exists()
                 else "the training is lost, there was no room for its checkpoint either"
             )
             raise CagefieldError(f"{line_of(error)}; {kept}") from error

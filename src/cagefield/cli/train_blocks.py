@@ -5,10 +5,13 @@ from __future__ import annotations
 import shutil
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cagefield.cli.options import stages
+from cagefield.errors import CagefieldError, line_of
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
@@ -52,13 +55,13 @@ def train_in_blocks(
     if anew:
         shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True, exist_ok=True)
-    if cluster is None:
-        with stages() as move:
-            result = train_blocks(dataset, blocks, jobs, on_stage=move)
-    else:
-        result = train_blocks(
-            dataset, blocks, jobs, trainer=lambda missing: _on_cluster(cluster, cluster_tls, missing, device)
-        )
+    trainer = None if cluster is None else partial(_on_cluster, cluster, cluster_tls, device=device)
+    try:
+        with nullcontext() if trainer else stages() as move:
+            result = train_blocks(dataset, blocks, jobs, trainer=trainer, on_stage=move)
+    except OSError as error:
+        kept = f"what is trained is kept in {folder}: the same command with --resume goes on from there"
+        raise CagefieldError(f"{line_of(error)}; {kept}") from error
     return Scene.trained(result, dataset), result
 
 

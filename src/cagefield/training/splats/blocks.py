@@ -5,12 +5,14 @@ each photo's points weigh 1 together: the core cells of the blocks, each the con
 is half-open, [low, high) along each axis, and the outer ones reach to infinity, so that every position is in
 exactly one core; a position outside the points' box is in the core that is nearest to it. A block's region is
 its core, grown by `OVERLAP` of its extent among the points at each inner plane. Its photos see enough points
-of the region; neighbors share the photos of the overlap.
+of the region, as a share of all that they see, or are among the nearest ones of enough of its points: the
+background of an object is a small part of all photos that see it. Neighbors share the photos of the overlap.
 
 Content farther from all cameras than `FAR_DEPTHS` median depths, the sky for example, belongs to no block: it
 is the scaffold's (`scaffold`), which all photos train. Each block is trained by itself (`train_blocks`), with
-the scaffold's splats around it. The merged field takes of each block the splats whose means lie in its core
-and near cameras, and of the scaffold those in no block.
+the scaffold's splats around it; then its own splats, whose means lie in its core and near cameras, are
+refined among those of its neighbors. The merged field has each block's own splats, and the scaffold's in no
+block.
 
 Source: the division follows VastGaussian (Lin et al. 2024, section 4), with visibility from the points of
 the reconstruction.
@@ -37,6 +39,8 @@ MIN_BLOCK_POINTS = 10
 """Minimum number of a region's points that a photo of the block sees."""
 MIN_PHOTO_SHARE = 0.25
 """Minimum share of the points that a photo sees which are the region's."""
+NEAREST_PHOTOS = 4
+"""Number of photos, the nearest of those that see a point, that a block of the point takes even so."""
 FAR_DEPTHS = 3.0
 """Distance from the nearest camera beyond which content is far, in median distances of points from photos."""
 MAX_BLOCKS = 10_000
@@ -68,6 +72,10 @@ class Block:
     def contains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
         """Mask [N] of positions [N,3] in the core and not far."""
         return self._near(inside_cell(self.core, positions), positions)
+
+    def own(self, field: SplatField) -> SplatField:
+        """The splats of a field whose means it contains."""
+        return field.take(self.contains(field.means))
 
     def trains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
         """Mask [N] of positions [N,3] in the region and not far."""
@@ -110,6 +118,8 @@ def divide(dataset: Dataset, points: SparsePoints, count: int) -> tuple[Block, .
     members = np.stack([inside_cell(region, points.positions) for region in regions])
     counts = np.stack([seen @ rows.astype(np.int32) for rows in members])
     chosen = (counts >= MIN_BLOCK_POINTS) & (counts >= MIN_PHOTO_SHARE * totals)
+    close = nearest_observations(dataset.train, points, seen)
+    chosen |= np.stack([close @ rows.astype(np.int32) for rows in members]) >= MIN_BLOCK_POINTS
     most = counts.argmax(axis=0)
     chosen[most, np.arange(len(totals))] |= counts.max(axis=0) >= MIN_BLOCK_POINTS
     origins = np.stack([view.camera.origin for view in dataset.train])
@@ -217,6 +227,20 @@ def visible_points(views: Sequence[View], points: SparsePoints) -> Any:
     return csr_matrix((np.ones(len(rows), np.int32), (photos, rows)), shape=(len(views), len(points)))
 
 
+def nearest_observations(views: Sequence[View], points: SparsePoints, seen: Any) -> Any:
+    """Sparse matrix int32 [V,M] as `seen`, of each point the NEAREST_PHOTOS nearest photos."""
+    from scipy.sparse import csr_matrix
+
+    photos, rows = seen.nonzero()
+    origins = np.stack([view.camera.origin for view in views])
+    distances = np.linalg.norm(origins[photos] - points.positions[rows], axis=1)
+    order = np.lexsort((photos, distances, rows))
+    photos, rows = photos[order], rows[order]
+    rank = np.arange(len(rows)) - np.searchsorted(rows, rows)
+    near = rank < NEAREST_PHOTOS
+    return csr_matrix((np.ones(near.sum(), np.int32), (photos[near], rows[near])), shape=seen.shape)
+
+
 def _in_frustum(view: View, positions: Array) -> NDArray[np.bool_]:
     pixels, depth = view.camera.project(positions)
     with np.errstate(invalid="ignore"):
@@ -242,28 +266,29 @@ def left_out(dataset: Dataset, blocks: Sequence[Block]) -> tuple[str, ...]:
     return tuple(view.name for n, view in enumerate(dataset.train) if n not in used)
 
 
-def merge(blocks: Sequence[Block], fields: Sequence[SplatField], scaffold: SplatField | None) -> SplatField:
-    """The field of all blocks: of each block's field the splats that it contains, of the scaffold the others.
+def merge(blocks: Sequence[Block], fields: Sequence[SplatField], scaffold: SplatField) -> SplatField:
+    """The field of all blocks: each block's own splats, of the scaffold those that no block contains.
 
-    The fields agree in everything but their splats. Without a `scaffold`, that of one block is the field.
+    The fields agree in everything but their splats.
 
     Raises:
-        CagefieldError: no block contains a splat of its field.
+        CagefieldError: no block has a splat.
     """
-    if scaffold is None:
-        return fields[0]
-    kept = [field.take(block.contains(field.means)) for block, field in zip(blocks, fields, strict=True)]
-    if not any(len(part) for part in kept):
+    if not any(len(part) for part in fields):
         raise CagefieldError("the blocks have no splats in their cores; give fewer --blocks")
     left = np.ones(len(scaffold), bool)
     for block in blocks:
         left &= ~block.contains(scaffold.means)
-    kept.append(scaffold.take(left))
+    return concatenate([*fields, scaffold.take(left)])
+
+
+def concatenate(fields: Sequence[SplatField]) -> SplatField:
+    """The splats of all fields as one, which has the last field's other values."""
     return replace(
-        scaffold,
-        means=np.concatenate([part.means for part in kept]),
-        log_scales=np.concatenate([part.log_scales for part in kept]),
-        quaternions=np.concatenate([part.quaternions for part in kept]),
-        opacities=np.concatenate([part.opacities for part in kept]),
-        sh=np.concatenate([part.sh for part in kept]),
+        fields[-1],
+        means=np.concatenate([part.means for part in fields]),
+        log_scales=np.concatenate([part.log_scales for part in fields]),
+        quaternions=np.concatenate([part.quaternions for part in fields]),
+        opacities=np.concatenate([part.opacities for part in fields]),
+        sh=np.concatenate([part.sh for part in fields]),
     )

@@ -9,6 +9,7 @@ Source: the coarse scaffold of Hierarchical 3D Gaussians (Kerbl et al. 2024, sec
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -48,28 +49,16 @@ class Context:
     """Surroundings of a block's training.
 
     Attributes:
-        frozen: splats outside `cell`, which take part in the images and stay as they are.
+        frozen: splats of other parts of the capture, which take part in the images and stay as they are.
         gains: [V,3] exposure gains of the block's photos, which are kept.
-        cell: space in which initial splats are placed.
+        cell: space in which initial splats are placed; None keeps all of them.
+        start_progress: progress at which the training begins, 0 to 1: above 0 of a refinement.
     """
 
     frozen: SplatField
     gains: Float32
-    cell: Cell
-
-    @classmethod
-    def around(cls, cell: Cell, scaffold: SplatField, gains: Float32, cameras: list[Camera]) -> Context:
-        """Context of a block from the scaffold's splats that its photos may show."""
-        rows = np.flatnonzero(~cell.trains(scaffold.means))
-        means = scaffold.means[rows].astype(np.float64)
-        shown = np.zeros(len(rows), bool)
-        for camera in cameras:
-            pixels, depth = camera.project(means)
-            size = np.array([camera.width, camera.height])
-            with np.errstate(invalid="ignore"):
-                inside = (pixels >= -VIEW_MARGIN * size).all(axis=1)
-                shown |= inside & (pixels < (1.0 + VIEW_MARGIN) * size).all(axis=1) & (depth > 0)
-        return cls(scaffold.take(rows[shown]), gains, cell)
+    cell: Cell | None = None
+    start_progress: float = 0.0
 
     def joined(self, state: SplatState) -> SplatState:
         """The initial splats of `state` within the cell, and the frozen ones.
@@ -77,12 +66,25 @@ class Context:
         Raises:
             CagefieldError: no initial splat lies in the cell.
         """
-        rows = np.flatnonzero(self.cell.trains(state.means))
-        if not len(rows):
+        if self.cell is not None:
+            state.take(np.flatnonzero(self.cell.trains(state.means)))
+        if not len(state):
             raise CagefieldError("a block has no points to start from; give fewer --blocks")
-        state.take(rows)
         state.append(SplatState.frozen_from(self.frozen, state.sh.shape[1]))
         return state
+
+
+def visible_splats(field: SplatField, cameras: Sequence[Camera]) -> SplatField:
+    """Splats whose means lie in front of a camera, in its photo or in a margin around it."""
+    means = field.means.astype(np.float64)
+    shown = np.zeros(len(field), bool)
+    for camera in cameras:
+        pixels, depth = camera.project(means)
+        size = np.array([camera.width, camera.height])
+        with np.errstate(invalid="ignore"):
+            inside = (pixels >= -VIEW_MARGIN * size).all(axis=1)
+            shown |= inside & (pixels < (1.0 + VIEW_MARGIN) * size).all(axis=1) & (depth > 0)
+    return field.take(shown)
 
 
 def scaffold_config(config: SplatConfig) -> SplatConfig:

@@ -119,6 +119,7 @@ class SplatRun:
         self._near = near_depth(dataset.bounds)
         self._max_splats = max_splats([view.cameras[0] for view in self.views], config)
         state, self.free_distances = seeds or initialize_splats(dataset, self.views, config, self._max_splats)
+        self._start_progress = 0.0 if context is None else context.start_progress
         if context is not None:
             state = context.joined(state)
         self._optimizer = new_optimizer(state, self._near, config.antialiased)
@@ -151,7 +152,12 @@ class SplatRun:
 
     @property
     def done(self) -> float:
-        """Progress of the run, 0 to 1."""
+        """Progress of the training, to 1; from 0, or from where a refinement begins."""
+        return 1.0 - (1.0 - self._start_progress) * (1.0 - self._share)
+
+    @property
+    def _share(self) -> float:
+        """Share of the run's steps or minutes that are done."""
         if self._config.minutes is not None:
             return min(1.0, self.seconds / (60.0 * self._config.minutes))
         return min(1.0, self.step / self._config.steps)
@@ -296,7 +302,7 @@ class SplatRun:
 
     def progress(self) -> SplatProgress:
         """Progress report of the run."""
-        done = self.done
+        done = self._share
         left = self.seconds * (1.0 - done) / done if done > 0 else float("nan")
         if self._config.minutes is not None:
             left = 60.0 * self._config.minutes - self.seconds

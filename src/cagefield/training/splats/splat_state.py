@@ -60,11 +60,18 @@ class SplatState:
     @classmethod
     def frozen_from(cls, field: SplatField, terms: int) -> SplatState:
         """Frozen splats of a field, with `terms` harmonics."""
+        state = cls.from_field(field, terms)
+        state.ticks[:] = -1
+        return state
+
+    @classmethod
+    def from_field(cls, field: SplatField, terms: int) -> SplatState:
+        """Splats of a field, with `terms` harmonics."""
         n, known = len(field), min(terms, field.sh.shape[1])
         opacities = np.clip(np.asarray(field.opacities, np.float64), 1e-4, 1.0 - 1e-4)
         sh = np.zeros((n, terms, 3), np.float32)
         sh[:, :known] = field.sh[:, :known]
-        state = cls(
+        return cls(
             np.array(field.means, np.float32),
             np.array(field.log_scales, np.float32),
             np.array(field.quaternions, np.float32),
@@ -72,8 +79,6 @@ class SplatState:
             sh,
             *_empty_optimizer_rows(n),
         )
-        state.ticks[:] = -1
-        return state
 
     def __len__(self) -> int:
         return len(self.means)

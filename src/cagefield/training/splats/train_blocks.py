@@ -1,10 +1,17 @@
 """Training of a capture in blocks, one after another or on a cluster, into one SplatField.
 
 First the scaffold is trained (`scaffold`), on all photos at a reduced size, then each block with the
-scaffold's splats around it. A folder keeps the finished ones, `block-0001.safetensors` with
-`block-0001.json`, and the checkpoint of the block in training, so that a training goes on where it stopped.
-One block is in memory at a time. Each gets as many steps and splats for each of its photos as a training of
-the whole capture would.
+scaffold's splats around it. At last each block's splats are refined: they take the last part of the block's
+steps among the finished splats of its neighbors, the blocks that share photos with it, instead of the
+scaffold's coarse ones. A folder keeps the finished ones, `block-0001.safetensors` with `block-0001.json`,
+`refined-0001.safetensors` and so on, and the checkpoint of the block in training, so that a training goes on
+where it stopped. One block is in memory at a time, a refinement with the splats of its neighbors, whose
+number does not grow with the capture. Each block gets as many steps and splats for each of its photos as a
+training of the whole capture would.
+
+Source: a refinement of the blocks is a step of block coordinate descent (Jacobi) on the loss of the whole
+capture; all blocks take it at once, from the same surroundings, so that it runs on many machines and does not
+depend on the blocks' order.
 """
 
 from __future__ import annotations
@@ -29,10 +36,23 @@ from cagefield.files.atomic import replaced_file
 from cagefield.files.safe_open import UnreadableError, open_regular
 from cagefield.training.evaluation import evaluate_views
 from cagefield.training.result import TrainResult
-from cagefield.training.splats.blocks import Block, block_dataset, divide, merge
-from cagefield.training.splats.scaffold import MIN_SPLATS, Context, scaffold_config, scaffold_dataset
+from cagefield.training.splats.blocks import Block, block_dataset, concatenate, divide, merge
+from cagefield.training.splats.initialization import InitialSplats
+from cagefield.training.splats.scaffold import (
+    MIN_SPLATS,
+    Context,
+    scaffold_config,
+    scaffold_dataset,
+    visible_splats,
+)
 from cagefield.training.splats.splat_config import SplatConfig
+from cagefield.training.splats.splat_state import SplatState
 from cagefield.training.splats.train_splats import train_splat
+
+REFINEMENT_STEPS_SHARE = 0.25
+"""Steps of a block's refinement, as a share of the block's."""
+REFINEMENT_START_PROGRESS = 0.6
+"""Progress of a training, in its learning rate and resolution, at which a refinement begins."""
 
 OnStage = Callable[[str, float, str], None]
 _MAX_RECORD_BYTES = 1 << 22
@@ -43,7 +63,8 @@ class BlockJob:
     """One block's training: photos and points, options with its own steps, and the files it writes.
 
     `key` is a digest of everything that the result depends on. The training of the scaffold has number -1
-    and no `block`; without a `scaffold` the block is the whole capture.
+    and no `block`; without a `scaffold` the block is the whole capture. A refinement has the `first` training
+    of its block, and those of its neighbors, of which only the files are read.
     """
 
     number: int
@@ -53,32 +74,61 @@ class BlockJob:
     key: str
     block: Block | None = None
     scaffold: BlockJob | None = None
+    first: BlockJob | None = None
+    neighbors: tuple[BlockJob, ...] = ()
 
     @property
     def name(self) -> str:
-        """Name of the block in messages, from 1."""
-        return "scaffold" if self.number < 0 else f"block {self.number + 1}"
+        """Name of the training in messages; blocks count from 1."""
+        name = "scaffold" if self.number < 0 else f"block {self.number + 1}"
+        return name if self.first is None else f"{name}, refinement"
+
+    @property
+    def photo_count(self) -> int:
+        """Number of the training's photos."""
+        return len(self.dataset.train if self.block is None else self.block.photos)
 
     def path(self, suffix: str) -> Path:
         """A file of the block in the folder."""
-        stem = "scaffold" if self.number < 0 else f"block-{self.number + 1:04d}"
+        kind = "block" if self.first is None else "refined"
+        stem = "scaffold" if self.number < 0 else f"{kind}-{self.number + 1:04d}"
         return self.folder / f"{stem}{suffix}"
 
     def context(self) -> Context | None:
-        """Surroundings from the finished scaffold; None without one.
+        """Surroundings from the finished scaffold, for a refinement also from the neighbors; None without.
 
         Raises:
-            CagefieldError: the scaffold is not finished, damaged, or of another training.
+            CagefieldError: one of them is not finished, damaged, or of another training.
         """
         if self.scaffold is None or self.block is None:
             return None
-        coarse = read_block(self.scaffold)
-        if coarse is None:
-            raise CagefieldError(
-                f"{self.scaffold.path('.safetensors')} is not there; the folder must be shared"
-            )
+        coarse = read_finished(self.scaffold)
+        gains = coarse.gains[list(self.block.photos)]
         cameras = [view.camera for view in self.dataset.train]
-        return Context.around(self.block, coarse.field, coarse.gains[list(self.block.photos)], cameras)
+        if self.first is None:
+            outside = coarse.field.take(~self.block.trains(coarse.field.means))
+            return Context(visible_splats(outside, cameras), gains, self.block)
+        others = [(job.block, read_finished(job).field) for job in self.neighbors if job.block is not None]
+        elsewhere = ~self.block.contains(coarse.field.means)
+        for block, _ in others:
+            elsewhere &= ~block.contains(coarse.field.means)
+        parts = [coarse.field.take(elsewhere), *(block.own(field) for block, field in others)]
+        frozen = concatenate([visible_splats(part, cameras) for part in parts])
+        return Context(frozen, gains, start_progress=REFINEMENT_START_PROGRESS)
+
+    def seeds(self) -> InitialSplats | None:
+        """Splats of a refinement, the block's own after its first training; None of another training.
+
+        Nothing is known of the photos' free space.
+        """
+        if self.first is None or self.block is None:
+            return None
+        own = self.block.own(read_finished(self.first).field)
+        cameras = [view.camera for view in self.dataset.train]
+        return InitialSplats(
+            SplatState.from_field(own, (self.config.sh_degree + 1) ** 2),
+            [np.zeros((2, camera.height, camera.width), np.float32) for camera in cameras],
+        )
 
 
 @dataclass(frozen=True)
@@ -123,7 +173,9 @@ def plan_blocks(
             raise CagefieldError(f"{dataset.path}: without points there are no blocks; leave out --blocks")
         points = SparsePoints(np.zeros((0, 3)), np.zeros((0, 3), np.uint8))
     blocks = divide(dataset, points, count)
-    jobs, scaffold = [], None
+    jobs: list[BlockJob] = []
+    refinements: list[SplatConfig] = []
+    scaffold = None
     if count > 1:
         whole = replace(scaffold_dataset(dataset), points=points)
         coarse = scaffold_config(config)
@@ -138,9 +190,51 @@ def plan_blocks(
             splats=None if config.splats is None else max(MIN_SPLATS, round(config.splats * share)),
         )
         photos = block_dataset(dataset, points, block)
+        if scaffold is not None:
+            part, last = _divided(part)
+            refinements.append(last)
         key = _key(block, part, dataset, "" if scaffold is None else scaffold.key)
         jobs.append(BlockJob(number, photos, part, folder, key, block, scaffold))
-    return blocks, tuple(jobs)
+    return blocks, tuple(jobs) if scaffold is None else _refinements(jobs, refinements)
+
+
+def _refinements(jobs: Sequence[BlockJob], configs: Sequence[SplatConfig]) -> tuple[BlockJob, ...]:
+    """The refinements of the blocks' first trainings, with their options."""
+    photos = [set() if job.block is None else set(job.block.photos) for job in jobs]
+    # Only their files are read: with one photo and no points a job is small when it is sent to a worker.
+    light = [
+        replace(job, dataset=replace(job.dataset, train=job.dataset.train[:1], points=None)) for job in jobs
+    ]
+    found = []
+    for job, config in zip(jobs, configs, strict=True):
+        near = tuple(light[n] for n in range(len(jobs)) if n != job.number and photos[n] & photos[job.number])
+        content = json.dumps([job.key, [other.key for other in near], dataclasses.asdict(config)])
+        key = hashlib.sha256(content.encode()).hexdigest()
+        found.append(replace(job, config=config, key=key, first=light[job.number], neighbors=near))
+    return tuple(found)
+
+
+def _divided(config: SplatConfig) -> tuple[SplatConfig, SplatConfig]:
+    """Options of a block's first training and of its refinement, which share its steps or minutes."""
+    first = max(1, round(config.steps * (1.0 - REFINEMENT_STEPS_SHARE)))
+    minutes = None if config.minutes is None else config.minutes * (1.0 - REFINEMENT_STEPS_SHARE)
+    rest = None if config.minutes is None else config.minutes * REFINEMENT_STEPS_SHARE
+    return (
+        replace(config, steps=first, minutes=minutes),
+        replace(config, steps=max(1, config.steps - first), minutes=rest),
+    )
+
+
+def training_stages(jobs: Sequence[BlockJob]) -> tuple[tuple[BlockJob, ...], ...]:
+    """Trainings whose end are `jobs`, the last of each block, in groups that follow one another."""
+    if jobs[0].scaffold is None:
+        return (tuple(jobs),)
+    first = (
+        replace(job, config=job.first.config, key=job.first.key, first=None, neighbors=())
+        for job in jobs
+        if job.first is not None
+    )
+    return (jobs[0].scaffold,), tuple(first), tuple(jobs)
 
 
 def train_blocks(
@@ -162,18 +256,23 @@ def train_blocks(
         CagefieldError: no block is finished; files in the folder of another training.
     """
     run = trainer or (lambda jobs: _one_by_one(jobs, on_stage))
-    scaffold = jobs[0].scaffold
-    coarse = None if scaffold is None else _finished([scaffold], run).get(-1)
-    found = _finished(jobs, run) if scaffold is None or coarse is not None else {}
-    if not found:
+    found: list[dict[int, TrainedBlock]] = []
+    for stage in training_stages(jobs):
+        found.append(_finished(stage, run))
+        if len(found[-1]) < len(stage):
+            break
+    coarse = found.pop(0)[-1] if jobs[0].scaffold is not None and found[0] else None
+    if not found or not found[0]:
         raise CagefieldError("no block is finished; the same command with --resume continues")
-    there = [blocks[number] for number in sorted(found)]
-    results = [found[number] for number in sorted(found)]
-    field = merge(there, [result.field for result in results], None if coarse is None else coarse.field)
+    first, refined = found[0], found[1] if len(found) > 1 else {}
+    results = [result for stage in found for result in stage.values()]
     if coarse is None:
-        gains = np.ones((len(dataset.train), 3), np.float32)
-        gains[list(there[0].photos)] = results[0].gains
+        only = first[0]
+        field, gains = only.field, only.gains
     else:
+        there = sorted(first)
+        fields = [refined[n].field if n in refined else blocks[n].own(first[n].field) for n in there]
+        field = merge([blocks[n] for n in there], fields, coarse.field)
         gains = coarse.gains
         results.append(coarse)
     some = dataset.train[:: max(1, len(dataset.train) // 10)] if evaluate else ()
@@ -183,7 +282,7 @@ def train_blocks(
         sum(result.seconds for result in results),
         evaluate_views(field, some).psnr,
         evaluate_views(field, dataset.test if evaluate else ()),
-        len(found) == len(jobs),
+        coarse is None or len(refined) == len(jobs),
         tuple(view.camera for view in dataset.train),
         gains,
     )
@@ -196,10 +295,7 @@ def _finished(
     found = {job.number: done for job in jobs if (done := read_block(job)) is not None}
     missing = [job for job in jobs if job.number not in found]
     for job in run(missing) if missing else ():
-        done = read_block(job)
-        if done is None:
-            raise CagefieldError(f"{job.path('.safetensors')} is not there; the folder must be shared")
-        found[job.number] = done
+        found[job.number] = read_finished(job)
     return found
 
 
@@ -212,6 +308,7 @@ def train_block(job: BlockJob, on_stage: OnStage | None = None) -> bool:
     result = train_splat(
         job.dataset,
         job.config,
+        seeds=job.seeds(),
         context=job.context(),
         checkpoint=checkpoint,
         resume=checkpoint.is_file(),
@@ -260,9 +357,21 @@ def read_block(job: BlockJob) -> TrainedBlock | None:
         raise CagefieldError(
             f"{path} is of other photos or options; give those of the first run, or --overwrite"
         )
-    if gains.shape != (len(job.dataset.train), 3) or not np.isfinite(gains).all() or not (gains > 0).all():
+    if gains.shape != (job.photo_count, 3) or not np.isfinite(gains).all() or not (gains > 0).all():
         raise CagefieldError(f"{path} is damaged (its gains); remove it to train {job.name} again")
     return TrainedBlock(SplatField.load(job.path(".safetensors")), gains, steps, seconds)
+
+
+def read_finished(job: BlockJob) -> TrainedBlock:
+    """A finished block from its files.
+
+    Raises:
+        CagefieldError: it is not finished; damaged files, and those of another training.
+    """
+    done = read_block(job)
+    if done is None:
+        raise CagefieldError(f"{job.path('.safetensors')} is not there; the folder must be shared")
+    return done
 
 
 def _one_by_one(jobs: Sequence[BlockJob], on_stage: OnStage | None) -> Iterator[BlockJob]:
