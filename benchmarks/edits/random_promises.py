@@ -192,7 +192,7 @@ def run_compiled(task: tuple[str, int, int]) -> Promises:
 def tasks(
     edits: int, points: int, done: Iterable[Promises], kinds: Collection[str] = tuple(KINDS)
 ) -> Iterator[tuple[str, int, int]]:
-    """The tasks of so many edits whose kinds take turns, but for those that are done or of no kind asked for."""
+    """The tasks of so many edits whose kinds take turns, of these kinds; those that are done are left out."""
     known = {(each.kind, each.number) for each in done}
     for n in range(edits):
         kind, number = list(KINDS)[n % len(KINDS)], n // len(KINDS)
