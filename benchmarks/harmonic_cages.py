@@ -8,7 +8,7 @@ more; a cable that is bent into a half circle and made straight, a concave cage.
 
 - coordinates as weights: x = sum lambda_j v_j', the usual way;
 - coordinates as a velocity: dx/dt = sum lambda_j(x, t) dv_j/dt on the closed form's way, in midpoint steps;
-- the product's map, `MeshShell`: the mean value velocity without the affine part, on a grid.
+- the product's map, `MeshShell`: the harmonic velocity without the affine part, on the flow's grid.
 
 Harmonic coordinates by linear finite elements on tetrahedra, the cage's own triangles at the boundary; the
 tetrahedra go along with a flow.
