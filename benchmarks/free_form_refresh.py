@@ -1,13 +1,15 @@
-"""Prints CPU milliseconds of a refresh of free-form edits: build, check and 64^3 nodes of a new shape.
+"""Prints CPU and wall milliseconds of a refresh of free-form edits: build, check, 64^3 nodes of a new shape.
 
 python -m benchmarks.free_form_refresh [--steps 8] [--resolution 64]
 
 Each edit is dragged a little further from step to step, as in the editor; the first step (caches of the cage
-at rest, compilation) is apart. CPU time of all threads, so that other programs do not count.
+at rest, compilation) is apart. CPU time is that of all threads, so that other programs do not count; on wall
+time they do, so the load of the machine is printed with it.
 """
 
 from __future__ import annotations
 
+import os
 import time
 from dataclasses import dataclass
 
@@ -62,18 +64,18 @@ def edits() -> dict[str, tuple[Continuous, object]]:
     }
 
 
-def refresh(edit: Continuous, resolution: int) -> tuple[float, float, str]:
-    """(CPU ms of build and check, of the nodes, the steps and cells of its flow)."""
-    started = time.process_time()
+def refresh(edit: Continuous, resolution: int) -> tuple[float, float, float, str]:
+    """(CPU ms of build and check, of the nodes, wall ms of both, the steps and cells of its flow)."""
+    started, wall = time.process_time(), time.perf_counter()
     shell = edit.shell.build(edit.inner, edit.deformed, edit.outer)
     problem = shell.problem()
     assert problem is None, problem
     checked = time.process_time()
     shell.sample(resolution)
-    done = time.process_time()
+    done, wall = time.process_time(), time.perf_counter() - wall
     flow = shell.flow if hasattr(shell, "flow") else shell.around.flow
     size = f"{len(flow.steps)} steps, {flow.cells} cells"
-    return 1e3 * (checked - started), 1e3 * (done - checked), size
+    return 1e3 * (checked - started), 1e3 * (done - checked), 1e3 * wall, size
 
 
 def main() -> None:
@@ -82,12 +84,13 @@ def main() -> None:
     for name, (edit, drag) in edits().items():
         shares = np.linspace(0.5, 1.0, arguments.steps + 1)
         rows = [refresh(drag(edit, t), arguments.resolution) for t in shares]
-        build, nodes = (float(np.median([row[k] for row in rows[1:]])) for k in range(2))
+        build, nodes, wall = (float(np.median([row[k] for row in rows[1:]])) for k in range(3))
         print(
             f"{name}: build and check {build:.0f}, nodes {nodes:.0f}, together {build + nodes:.0f}"
-            f" (first {rows[0][0] + rows[0][1]:.0f}); {rows[-1][2]}",
+            f" (first {rows[0][0] + rows[0][1]:.0f}), wall {wall:.0f}; {rows[-1][3]}",
             flush=True,
         )
+    print(f"load of {os.cpu_count()} cores: {os.getloadavg()[0]:.1f} in the last minute")
 
 
 if __name__ == "__main__":

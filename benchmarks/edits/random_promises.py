@@ -27,7 +27,7 @@ import argparse
 import json
 import multiprocessing
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -189,12 +189,14 @@ def run_compiled(task: tuple[str, int, int]) -> Promises:
     return Promises(kind, number, seed, refused, *measured)
 
 
-def tasks(edits: int, points: int, done: Iterable[Promises]) -> Iterator[tuple[str, int, int]]:
-    """The tasks of so many edits whose kinds take turns, but for those that are done."""
+def tasks(
+    edits: int, points: int, done: Iterable[Promises], kinds: Collection[str] = tuple(KINDS)
+) -> Iterator[tuple[str, int, int]]:
+    """The tasks of so many edits whose kinds take turns, of these kinds; those that are done are left out."""
     known = {(each.kind, each.number) for each in done}
     for n in range(edits):
         kind, number = list(KINDS)[n % len(KINDS)], n // len(KINDS)
-        if (kind, number) not in known:
+        if kind in kinds and (kind, number) not in known:
             yield kind, number, points
 
 
@@ -260,12 +262,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--edits", type=int, default=10_000, help="number of random edits")
     parser.add_argument("--points", type=int, default=24, help="points of each sort per edit")
+    parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--log", type=Path, help="file of finished edits, from which a run goes on")
     parser.add_argument("--out", type=Path, help="Markdown file for the table")
     options = parser.parse_args()
     rows = [] if options.log is None else read_log(options.log)
-    todo = list(tasks(options.edits, options.points, rows))
+    todo = list(tasks(options.edits, options.points, rows, options.kinds))
     with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
         for row in pool.imap_unordered(run_compiled, todo):
             rows.append(row)

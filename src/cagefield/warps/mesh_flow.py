@@ -1,4 +1,4 @@
-"""The flow of a mesh cage: its vertices' motion blended by mean value coordinates; see `mesh_shell`."""
+"""The flow of a mesh cage: its vertices' motion blended by harmonic coordinates; see `mesh_shell`."""
 
 from __future__ import annotations
 
@@ -21,8 +21,15 @@ from cagefield.warps.linear_motion import LinearMotion
 
 MIN_MESH_STEPS, MAX_MESH_STEPS = 4, 64
 
+HARMONIC_SWEEPS, OVER_RELAXATION = 30, 1.7
+"""Sweeps over the nodes inside of a mesh from its mean value to its harmonic blend; `harmonic_inside`."""
+
 SWEEPS = 16
 """Sweeps over the vertices that make the grid's velocity theirs, see `meet_points`."""
+
+
+SHIFT: Array = np.array([0.61, 0.83, 0.47])
+"""Direction in which the nodes are shifted against the cage, see `_nodes`."""
 
 
 def blend(
@@ -44,6 +51,25 @@ def blend(
     out = np.empty((len(places), 4))
     blend_motion(np.ascontiguousarray(places), center, corners, moved, table, out)
     return out
+
+
+def harmonic_inside(
+    blended: Array, z: Array, triangles: Triangles, motion: Array, spacing: Array, inside: NDArray[np.intp]
+) -> None:
+    """Makes a blend [G^3,3] at nodes of a grid over [-1,1]^3 harmonic at those inside of a mesh, in place.
+
+    z [V,3]: the mesh's vertices, shifted as the nodes are (`_nodes`); motion [V,3]; spacing [3] of the nodes,
+    world units; inside [M]: numbers of nodes, none on the grid's faces. Before, the blend is a start inside
+    and the value of nodes that are not.
+    """
+    from cagefield.warps.kernels.harmonic import NO_CROSSING, cross_lines, relax
+
+    n = round(len(blended) ** (1.0 / 3.0))
+    ends = np.empty((2, 3, n**3))
+    ends[0], ends[1] = NO_CROSSING, -NO_CROSSING
+    values = np.empty((2, 3, n**3, 3))
+    cross_lines(n, 0.5 * (n - 1) * (z + 1.0), triangles, motion, ends, values)
+    relax(n, inside, spacing**-2.0, ends, values, blended, HARMONIC_SWEEPS, OVER_RELAXATION)
 
 
 @dataclass(frozen=True)
@@ -108,10 +134,11 @@ class MeshFlow:
     """Flow of V^o onto itself, z -> Phi(z) in the coordinates z in [-1,1]^3 of a parallel-sided outer cage.
 
     The velocity at x, in a step of `MeshPiece.chord`: w (B x + b + e(x)), with e the residuals of the
-    vertices blended by mean value coordinates (`kernels.mean_value`), and w the weight of `Falloff` at the
-    distances d_i from the mesh, less one cell of the grid, and d_o from the outer cage. It is interpolated
-    from a grid of nodes, one slice for each step, trilinear in z: so its slope has a bound, and a step of the
-    implicit midpoint rule, which is its own inverse, is one to one where h |dv/dz| < 2 (see `LatticeFlow`).
+    vertices blended by harmonic coordinates inside of the mesh (`kernels.harmonic`), outside by mean value
+    coordinates (`kernels.mean_value`), and w the weight of `Falloff` at the distances d_i from the mesh, less
+    one cell of the grid, and d_o from the outer cage. It is interpolated from a grid of nodes, one slice
+    for each step, trilinear in z: so its slope has a bound, and a step of the implicit midpoint rule, which
+    is its own inverse, is one to one where h |dv/dz| < 2 (see `LatticeFlow`).
 
     A mesh as outer cage has the coordinates of its box. d_o is then the distance from its surface, less one
     cell, and the velocity is 0 at nodes nearer than that: so it is in every cell that reaches outside, and
@@ -189,6 +216,8 @@ class MeshFlow:
         d_i = (found[:, 3] - np.minimum(cell_diagonal(self.outer, self.cells), 0.5 * d_o)).clip(0.0)
         a, linear, _ = falloff_numbers(self.falloff)
         w, _ = self.falloff.weight(d_i / d_o, (a, linear))
+        if residual.any():
+            found[:, :3] = self._harmonic(found, rows, vertices, residual)
         v = w[:, None] * (places @ B.T + b + found[:, :3])
         flat = np.zeros(((self.cells + 1) ** 3, 3), dtype=np.float32)
         flat[rows] = v @ self.confines.inverse.T
@@ -198,6 +227,15 @@ class MeshFlow:
             wanted = (vertices @ B.T + b + residual) @ self.confines.inverse.T
             meet_points(grid, z, wanted, SWEEPS)
         return grid
+
+    def _harmonic(self, found: Array, rows: NDArray[np.intp], vertices: Array, residual: Array) -> Array:
+        """The blend [N,3] at the nodes `rows` [N], harmonic inside, from `blend` [N,4] of residuals [V,3]."""
+        blended = np.zeros(((self.cells + 1) ** 3, 3))
+        blended[rows] = found[:, :3]
+        z = (vertices - self.confines.center) @ self.confines.inverse.T - 1e-7 * SHIFT
+        spacing = np.linalg.norm(self.confines.frame, axis=0) * (2.0 / self.cells)
+        harmonic_inside(blended, z, self.triangles, residual, spacing, rows[found[:, 3] <= 0.0])
+        return blended[rows]
 
 
 def cell_diagonal(outer: Cage, cells: int) -> float:
@@ -224,7 +262,7 @@ def _nodes(outer: Cage, cells: int) -> tuple[Array, NDArray[np.intp], Array]:
     z = 2.0 * bspline_lattice.grid(3 * (cells + 1,)) - 1.0
     rows = np.flatnonzero(np.abs(z).max(axis=1) < 1.0 - 1e-9)
     d_o = outer_distance(confines, z[rows])
-    places = confines.center + (z[rows] + 1e-7 * np.array([0.61, 0.83, 0.47])) @ confines.frame.T
+    places = confines.center + (z[rows] + 1e-7 * SHIFT) @ confines.frame.T
     if isinstance(outer, MeshCage):
         d_o = distance_inside(outer, places) - cell_diagonal(outer, cells)
         inside = np.flatnonzero(d_o > 0.0)

@@ -47,8 +47,7 @@ class MeshShell:
 
     to_deformed is the flow Phi of a `MeshFlow`, to_canonical its inverse: each step is its own inverse, so
     that they close to rounding. Each step is proven one to one by a bound of its velocity's slope. Vertices
-    go where they are moved; the space between follows their mean value coordinates as a velocity: coordinates
-    that are negative, inside of a concave mesh, cannot fold it.
+    go where they are moved; the space between follows their harmonic coordinates as a velocity.
 
     Parameters: the canonical and the deformed inner cage, the outer cage, with parallel faces or a mesh, the
     falloff.
