@@ -31,7 +31,7 @@ from cagefield.rendering.splats.bake_splats import baked_splats
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.scene.import_splats import axis_of, import_splats, nearest_up
 from cagefield.scene.scene import Scene
-from cagefield.server.render_queue.splat_downloads import write_edited
+from cagefield.server.render_worker.edited_splats import EditedSplats, write_edited
 from commands import printed, refused
 from scenes import ball_field, ball_scene
 from splat_scenes import ball_of_splats, random_splats, splat_scene
@@ -145,7 +145,7 @@ def test_a_scene_with_z_up_stands_upright_in_files(
     assert "turned upright from z-up; --up y-down keeps the scene's coordinates" in said
     read = read_splats(out)
     # The editor's download is the same file.
-    write_edited(str(folder), (), True, str(tmp_path / f"page{ending}"))
+    write_edited(EditedSplats(str(folder), "scene", ending[1:], ()), str(tmp_path / f"page{ending}"))
     assert (tmp_path / f"page{ending}").read_bytes() == out.read_bytes()
     R = np.eye(4)
     R[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # (x, y, z) becomes (x, -z, y)

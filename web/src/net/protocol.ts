@@ -342,10 +342,15 @@ export interface Drawing {
 }
 /**
  * Writes the edited splats, the edits baked in, to a file to be downloaded; in the background.
+ *
+ * With `along_path`, those of each frame of the camera path: time samples of a USD file, else a zip archive
+ * of a file for each frame.
  */
 export interface ExportSplats {
   type: "export";
   form: "ply" | "compressed.ply" | "spz" | "sog" | "splat" | "glb" | "usda" | "usdc" | "usdz";
+  along_path?: boolean;
+  fps?: number;
 }
 /**
  * Shrinks the inner cage to the dense region inside it.

@@ -300,10 +300,16 @@ class RenderJob(Message):
 
 
 class ExportSplats(Message):
-    """Writes the edited splats, the edits baked in, to a file to be downloaded; in the background."""
+    """Writes the edited splats, the edits baked in, to a file to be downloaded; in the background.
+
+    With `along_path`, those of each frame of the camera path: time samples of a USD file, else a zip archive
+    of a file for each frame.
+    """
 
     type: Literal["export"] = "export"
     form: SplatForm
+    along_path: bool = False
+    fps: Annotated[float, Field(ge=MIN_FPS, le=120)] = 24.0
 
 
 class CancelJob(Message):
