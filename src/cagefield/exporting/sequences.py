@@ -15,6 +15,7 @@ from cagefield.exporting.path_frames import CameraPath, splats_at
 from cagefield.exporting.similarity import aligned_splats
 from cagefield.fields.splat_field import SplatField
 from cagefield.files.atomic import replaced_file
+from cagefield.files.stale_files import remove_unfinished
 from cagefield.formats.splats.axes import Axes
 from cagefield.formats.splats.splat_files import find_writer, write_splats
 from cagefield.formats.splats.spz_writer import Version as SpzVersion
@@ -56,13 +57,14 @@ def write_sequence(
     `pattern` is a name with %d or %04d. Splats are aligned as the scene is, and
     turned upright from `up` [3]. Files that are there are
     kept unless `overwrite` is set: an interrupted export goes on where it ended. Each file is complete or not
-    there. Memory holds one frame.
+    there; unfinished files of ended programs are removed from their folder. Memory holds one frame.
 
     Raises:
         CagefieldError: a name without number, or a format without writer.
         EditError: an edit that is not possible at a part that the path shows.
     """
     find_writer(pattern, spz_version)
+    remove_unfinished(pattern.parent)
     stills = path.stills()
     written = kept = 0
     for number, still in enumerate(stills):

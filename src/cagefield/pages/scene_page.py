@@ -79,14 +79,15 @@ class ScenePage:
         loop: bool = False,
         step: float = 0.5,
         levels: bool = False,
+        budget: int | None = None,
         on_progress: Callable[[float], None] = lambda done: None,
     ) -> ScenePage:
         """The page of an edited scene, with the camera path of `keys`.
 
         `step` is the distance between samples in voxels. With `levels`, splats get levels of detail, for a
         folder (`page_nodes`): edits are baked in, so that the page does not show the scene before them, and
-        stand still along the path. `on_progress` is told how much is done of the edits along the path, or of
-        the levels.
+        stand still along the path; the page holds at most `budget` of its splats at a time, if given.
+        `on_progress` is told how much is done of the edits along the path, or of the levels.
 
         Raises:
             CagefieldError: the scene holds discs (2DGS).
@@ -100,7 +101,7 @@ class ScenePage:
                     "the scene holds voxels, whose pages have levels already; leave out --levels"
                 )
             coarse, nodes = encode_page_nodes(
-                edited_splats(scene), background=scene.background, on_progress=on_progress
+                edited_splats(scene), background=scene.background, budget=budget, on_progress=on_progress
             )
             found, along = {"field": coarse}, None
         elif isinstance(field, SplatSet):

@@ -120,7 +120,8 @@ export class SceneViewer {
     await renderer.load(source, {
       openBeside,
       onDetails: () => this.refresh(),
-      onCoarse: (nodes, of) => this.say(`The GPU has no room for the details of ${nodes} of ${of} parts.`),
+      onCoarse: (nodes, of) => this.say(`There is no room for the details of ${nodes} of ${of} parts.`),
+      onFailure: (reason) => this.say(reason),
       onArrival: (bytes) => this.progressed(Math.min(0.99, bytes / files.field.bytes)),
       onLevel: (number, count) => {
         this.say(number < count ? "Loading detail …" : "");
