@@ -93,7 +93,7 @@ def _export(server: EditorServer, client: PageClient, number: int) -> Said:
 
 
 def _frames(server: EditorServer, client: PageClient, number: int) -> Said:
-    client.send("export", form="ply", along_path=True, fps=3)
+    client.send("export", form="ply", along_path=True, fps=1)
     return _until(client, _job)
 
 

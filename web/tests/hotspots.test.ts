@@ -1,4 +1,5 @@
 import { expect, test } from "vitest";
+import { placeAt } from "../src/viewer/camera_path";
 import { poseBetween } from "../src/viewer/flight";
 import { projectPoint } from "../src/viewer/hotspots";
 import { roundLength } from "../src/viewer/scale_bar";
@@ -41,6 +42,29 @@ test("a mark is seen before a surface and hidden behind it", () => {
   expect(at(1, [1, 0.5, -2]).seen).toBe(true);
   expect(at(Infinity, [0, 0, 2]).seen).toBe(false);
   expect(at(Infinity, [3, 0, -2]).seen).toBe(false);
+});
+
+test("a mark goes with its part along the path, and is hidden where that is not there", () => {
+  const still = { c2w: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], fov_y_deg: 40 };
+  const path = { stills: [still, still, still], seconds: 2, loop: false };
+  const places: ([number, number, number] | null)[] = [null, [1, 0, 0], [3, 0, 2]];
+  expect(placeAt(places, path, 0)).toBeNull();
+  expect(placeAt(places, path, 0.5)).toBeNull();
+  expect(placeAt(places, path, 1)).toEqual([1, 0, 0]);
+  expect(placeAt(places, path, 1.5)).toEqual([2, 0, 1]);
+  expect(placeAt(places, path, 9)).toEqual([3, 0, 2]);
+  // Round a loop, between the last still and the first.
+  expect(
+    placeAt(
+      [
+        [0, 0, 0],
+        [1, 0, 0],
+        [4, 0, 0],
+      ],
+      { ...path, loop: true, seconds: 3 },
+      2.5,
+    ),
+  ).toEqual([2, 0, 0]);
 });
 
 test("the scale bar has a round length", () => {
