@@ -165,7 +165,10 @@ export function dialogs(app: App): Dialogs {
       };
       form.onchange = explain;
       explain();
+      const most = number(1, 1, 1e9);
+      Object.assign(most, { name: "splats", value: "", required: false, placeholder: "all" });
       const fields = [field("File", form)];
+      if (!frames) fields.push(field("At most so many splats", most));
       if (frames) fields.push(field("Frames per second", fps), kind);
       const title = frames ? "Download the splats of each frame of the path" : "Download the edited splats";
       ask(title, "Download", fields, () => {
@@ -174,6 +177,7 @@ export function dialogs(app: App): Dialogs {
           form: form.value as ExportSplats["form"],
           along_path: frames,
           fps: Number(fps.value),
+          splats: most.value === "" ? null : Number(most.value),
         });
       });
     },

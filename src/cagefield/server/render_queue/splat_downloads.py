@@ -119,6 +119,7 @@ class Exports:
             document.removed,
             document.meters_per_unit,
             path,
+            message.splats,
         )
 
     def _is_shown(self, edit: Edit) -> bool:

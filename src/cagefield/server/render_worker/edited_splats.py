@@ -33,6 +33,8 @@ class EditedSplats:
     removed: Selection | None = None
     meters_per_unit: float | None = None
     path: CameraPath | None = None
+    splats: int | None = None
+    """Maximum number of splats of a moment, beyond which they are merged; None keeps all."""
 
     def opened(self) -> Scene:
         """Scene with these edits, elements and scale."""
@@ -81,16 +83,20 @@ def write_edited(
     from cagefield.exporting.sequences import write_sequence_archive
     from cagefield.exporting.similarity import aligned_splats
     from cagefield.exporting.usd_scenes import StageScene, write_scenes_usd
+    from cagefield.fields.splat_decimation import decimate_splats
     from cagefield.formats.splats.splat_files import write_splats
 
     scene, path = content.opened(), Path(out)
     path.parent.mkdir(parents=True, exist_ok=True)
-    pastes = any(isinstance(edit, Paste) for edit in scene.edits)
-    if is_usd(content.form) and (content.path is not None or pastes):
+    has_prims = content.splats is None and any(isinstance(edit, Paste) for edit in scene.edits)
+    if is_usd(content.form) and (content.path is not None or has_prims):
         stage = [StageScene(content.name, scene, scene.up)]
         write_scenes_usd(path, stage, content.path, on_progress=on_progress)
     elif content.path is not None:
         pattern = f"{content.name.replace('%', '_')}_%04d.{content.form}"
         write_sequence_archive(scene, content.path, path, pattern, scene.up, on_progress=on_progress)
     else:
-        write_splats(upright(aligned_splats(edited_splats(scene), scene), scene.up), path)
+        splats = edited_splats(scene)
+        if content.splats is not None:
+            splats = decimate_splats(splats, content.splats)
+        write_splats(upright(aligned_splats(splats, scene), scene.up), path)
