@@ -40,8 +40,10 @@ from editor_server import editor_server
 
 HERE = Path(__file__).parent
 HELMET = load_edits(HERE.parent / "edits" / "biker_larger_helmet.yaml")
-HELMET_BOX = ((-0.62, -1.72, 0.04), (-0.18, -1.02, 0.64))
-KNEE_BOX = ((-0.6, -0.6, -1.0), (0.6, -0.4, 1.0))
+HELMET_PIXEL, KNEE_PIXEL = (150, 262), (190, 488)
+"""Pixels of the camera of `hotspots`."""
+PAGE_SPLATS = 50_000
+"""Splats of the scene in the browser, which draws in software."""
 
 
 def main() -> None:
@@ -57,9 +59,13 @@ def main() -> None:
 def hotspots(scene: Scene, folder: Path) -> None:
     """The dialog of a hotspot; a page with an open card; both hotspots before and after an edit."""
     camera = near(scene, 500, 560)
+    assert isinstance(scene.field, SplatField)
+    scene = dataclasses.replace(scene, field=decimate_splats(scene.field, PAGE_SPLATS))
     text = "In his hand.\nHalf as large again after the edit."
-    helmet = Hotspot("Helmet", surface(scene, HELMET_BOX), text)
-    knee = Hotspot("Knee slider", surface(scene, KNEE_BOX), "Stays where it is.", view_of_camera(camera))
+    helmet = Hotspot("Helmet", surface(scene, camera, HELMET_PIXEL), text)
+    knee = Hotspot(
+        "Knee slider", surface(scene, camera, KNEE_PIXEL), "Stays where it is.", view_of_camera(camera)
+    )
     marked = dataclasses.replace(
         scene,
         hotspots=tuple(dataclasses.replace(hotspot, follows=True) for hotspot in (helmet, knee)),
@@ -139,14 +145,11 @@ def near(scene: Scene, width: int, height: int) -> Camera:
     return Camera.look_at(eye, target, scene.up, width=width, height=height, fov_x=0.62)
 
 
-def surface(scene: Scene, box: tuple[tuple[float, ...], tuple[float, ...]]) -> tuple[float, float, float]:
-    """The opaque splat in a box that is nearest to the camera of `near`."""
-    field = scene.field
-    assert isinstance(field, SplatField)
-    inside = ((field.means > box[0]) & (field.means < box[1])).all(axis=1) & (field.opacities > 0.8)
-    means = field.means[inside]
-    eye = near(scene, 10, 10).origin
-    x, y, z = means[np.argsort(np.linalg.norm(means - eye, axis=1))[len(means) // 50]].tolist()
+def surface(scene: Scene, camera: Camera, at: tuple[int, int]) -> tuple[float, float, float]:
+    """Point of the surface at a pixel of a camera."""
+    depth = scene.render(camera).depth[at[1], at[0]]
+    ray = np.array([(at[0] + 0.5 - camera.cx) / camera.fx, (camera.cy - at[1] - 0.5) / camera.fy, -1.0])
+    x, y, z = (camera.origin + depth * (camera.c2w[:3, :3] @ ray) / np.linalg.norm(ray)).tolist()
     return x, y, z
 
 
