@@ -111,10 +111,10 @@ def _usd(ending: str) -> Command:
 
 def _levels(folder: Path, say: Say) -> None:
     """Levels of detail of a scene of 50 splats: a coarse level of 20, and nodes of 15."""
-    from cagefield.pages import scene_page
+    from cagefield.pages import page_nodes, scene_page
 
-    small = functools.partial(scene_page.encode_page_nodes, coarse=20, node=15)
-    scene_page.encode_page_nodes = small  # type: ignore[assignment]
+    small = functools.partial(page_nodes.encode_page_nodes, coarse=20, node=15)
+    setattr(scene_page, "encode_page_nodes", small)  # noqa: B010
     arguments = ("--embed", "--levels", "--overwrite")
     cli("export", folder / "scene", "-o", folder / "out", *arguments)
     say(1)
