@@ -21,8 +21,11 @@ from cagefield.exporting import (
     cages_of,
     fitting_cameras,
     inside,
+    upright,
     upright_turn,
 )
+from cagefield.fields.splat_decimation import decimate_splats
+from cagefield.fields.splat_field import SplatField
 from cagefield.files.ply import read_ply
 from cagefield.formats.splats.splat_files import read_splats
 from cagefield.geometry.cage import Cage
@@ -31,10 +34,10 @@ from cagefield.rendering.splats.bake_splats import baked_splats
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.scene.import_splats import axis_of, import_splats, nearest_up
 from cagefield.scene.scene import Scene
-from cagefield.server.render_queue.splat_downloads import write_edited
+from cagefield.server.render_worker.edited_splats import EditedSplats, write_edited
 from commands import printed, refused
 from scenes import ball_field, ball_scene
-from splat_scenes import ball_of_splats, random_splats, splat_scene
+from splat_scenes import assert_same_splats, ball_of_splats, random_splats, splat_scene
 
 INNER = Cage.box((0, 0, 0), 1.3)
 MOVED = Edit.move(INNER, name="ball").translate((0.25, 0, 0))
@@ -116,6 +119,17 @@ def test_selections_that_mean_nothing_are_refused() -> None:
 # ---- upright ----
 
 
+def test_the_editors_download_merges_splats_beyond_a_number(tmp_path: Path) -> None:
+    folder = saved(splat_scene(), tmp_path / "scene")
+    content = EditedSplats(str(folder), "scene", "ply", (), splats=200)
+    write_edited(content, str(tmp_path / "x.ply"))
+    scene = Scene.open(folder)
+    assert isinstance(scene.field, SplatField)
+    expected = upright(decimate_splats(scene.field, 200), scene.up)
+    assert_same_splats(read_splats(tmp_path / "x.ply"), expected, rtol=1e-5, atol=1e-5)
+    assert len(expected) == 200
+
+
 def test_quarter_turns_bring_every_axis_upright() -> None:
     for name in ("y-down", "y-up", "z-up", "z-down", "x-up", "x-down"):
         up = axis_of(name)
@@ -145,7 +159,7 @@ def test_a_scene_with_z_up_stands_upright_in_files(
     assert "turned upright from z-up; --up y-down keeps the scene's coordinates" in said
     read = read_splats(out)
     # The editor's download is the same file.
-    write_edited(str(folder), (), True, str(tmp_path / f"page{ending}"))
+    write_edited(EditedSplats(str(folder), "scene", ending[1:], ()), str(tmp_path / f"page{ending}"))
     assert (tmp_path / f"page{ending}").read_bytes() == out.read_bytes()
     R = np.eye(4)
     R[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # (x, y, z) becomes (x, -z, y)

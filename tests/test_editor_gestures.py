@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -444,6 +445,14 @@ def test_a_camera_path_is_recorded_and_played(editor: EditorPage) -> None:
     with editor.page.expect_download() as download:
         editor.page.click('a[download="camera_path.json"]')
     assert len(json.loads(Path(download.value.path()).read_text())["keyframes"]) == 2
+    editor.page.click("text=Download frames…")
+    editor.page.select_option("dialog[open] select[name=form]", "spz")
+    editor.page.fill("dialog[open] input[name=fps]", "5")
+    with editor.page.expect_download(timeout=1000 * PATIENCE) as download:
+        editor.page.click("dialog[open] .primary")
+    assert download.value.suggested_filename == "ball.spz.zip"
+    with zipfile.ZipFile(download.value.path()) as archive:
+        assert archive.namelist() == ["ball_0000.spz", "ball_0001.spz", "ball_0002.spz"]
 
 
 def test_a_distance_is_measured(editor: EditorPage) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tracemalloc
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,10 @@ from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframe_files import dump_path
 from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import Edit, EditStack
-from cagefield.errors import EditError
+from cagefield.errors import CagefieldError, EditError
 from cagefield.exporting import edited_splats, upright
 from cagefield.exporting.path_frames import CameraPath, edits_at, splats_at
-from cagefield.exporting.sequences import frame_file, write_sequence
+from cagefield.exporting.sequences import frame_file, write_sequence, write_sequence_archive
 from cagefield.exporting.usd_scenes import StageScene, edited_parts, write_scenes_usd
 from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats.splat_files import read_splats, write_splats
@@ -155,6 +156,21 @@ def test_a_sequence_has_the_splats_of_each_frame(
     assert files[1].read_bytes() == b"mine" and files[3].exists()
     printed(capsys, "export", folder, "-o", pattern, "--fps", FPS, "--overwrite")
     assert files[1].read_bytes() != b"mine"
+
+
+def test_an_archive_has_the_files_of_a_sequence(tmp_path: Path) -> None:
+    scene = scene_with(MOVED)
+    write_sequence(scene, PATH, tmp_path / "frames" / "f_%02d.spz", scene.up)
+    shares: list[float] = []
+    out = tmp_path / "out" / "frames.zip"
+    assert write_sequence_archive(scene, PATH, out, "f_%02d.spz", scene.up, on_progress=shares.append) == 5
+    with zipfile.ZipFile(out) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    assert members == files_of(tmp_path / "frames") and len(members) == 5
+    assert shares == [0.2, 0.4, 0.6, 0.8, 1.0]
+    assert [file.name for file in out.parent.iterdir()] == ["frames.zip"]
+    with pytest.raises(CagefieldError, match="one %d or %04d"):
+        write_sequence_archive(scene, PATH, out, "f.spz", scene.up)
 
 
 @pytest.mark.nightly

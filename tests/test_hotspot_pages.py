@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cagefield import Hotspot, Scene
+from cagefield import Cage, Edit, EditStack, Hotspot, Scene
 from cagefield.cameras.camera import Camera
+from cagefield.cameras.keyframes import Keyframe, stills
 from cagefield.pages.scene_page import ScenePage
 from cagefield.scene.alignment import Alignment
 from cagefield.scene.hotspot_tour import between, pose_of
@@ -173,6 +174,56 @@ def test_an_exported_page_marks_them_and_tours(tmp_path: Path) -> None:
         page.press("body", "Escape")
         assert not page.is_visible(".card")
         assert page.evaluate("window.taken === undefined && document.images.length === 0")
+
+
+def moving_scene() -> tuple[Scene, tuple[Keyframe, ...]]:
+    """A ball that an edit moves up, at once and from half of a path on; hotspots on it and beside it."""
+    cage = Cage.box((0, 0, 0), 1.2)
+    edit = Edit.move(cage).translate((0, 0, 0.4)).replace(fill="none", relight="none")
+    camera = camera_at((0.0, -3.0, 0.0), 120, 120)
+    on, beside = Hotspot("on", (0.0, -RADIUS, 0.0), follows=True), Hotspot("beside", (0.3, -0.4, 0.0))
+    scene = Scene(ball_field(radius=RADIUS), EditStack([edit]), {"test": (camera,)}, hotspots=(on, beside))
+    keys = tuple(
+        Keyframe(tuple(camera.c2w.ravel().tolist()), 50.0, 1.0, {1: part}) for part in (0.0, 0.0, 1.0)
+    )
+    return scene, keys
+
+
+def test_places_along_a_path_are_those_of_the_edits_parts() -> None:
+    scene, keys = moving_scene()
+    header = ScenePage.build(scene, "ball", keys).header
+    on, beside = header["hotspots"]
+    assert on["position"] == pytest.approx([0, -RADIUS, 0.4]) and "along" not in beside
+    expected = stills(keys, loop=False, fps=12.0, width=9, height=9)
+    assert len(on["along"]) == len(expected) == len(header["path"]["stills"])
+    for place, still in zip(on["along"], expected, strict=True):
+        assert place == pytest.approx([0, -RADIUS, 0.4 * still.parts[1]], abs=1e-9)
+    whole = ScenePage.build(scene, "ball", tuple(dataclasses.replace(key, parts={}) for key in keys)).header
+    assert all("along" not in entry for entry in whole["hotspots"])
+
+
+def test_marks_go_with_the_parts_that_a_path_moves(tmp_path: Path) -> None:
+    scene, keys = moving_scene()
+    file = tmp_path / "scene.html"
+    file.write_text(ScenePage.build(scene, "ball", keys).one_file(), encoding="utf-8")
+    with shown(file, size=120) as page:
+        until(page, "cagefieldViewer.viewer.canPlay")
+        for seconds, height in ((0.0, 0.0), (2.0, 0.4)):
+            page.evaluate(
+                "seconds => cagefieldViewer.viewer.seek(cagefieldViewer.viewer.header.path, seconds)", seconds
+            )
+            at = 60.0 - 60.0 / math.tan(math.radians(25.0)) * height / (3.0 - RADIUS)
+            middle = (
+                "(b => b.y + b.height / 2)"
+                "(document.querySelector('.hotspots button').getBoundingClientRect())"
+            )
+            until(page, f"Math.abs({middle} - {at}) < 0.6")
+        # The view of the page's start shows the whole edits again.
+        page.evaluate("cagefieldViewer.viewer.seek(cagefieldViewer.viewer.header.path, 0)")
+        page.press("body", "h")
+        assert page.evaluate(
+            "cagefieldViewer.viewer.place(cagefieldViewer.viewer.header.hotspots[0])[2]"
+        ) == (pytest.approx(0.4))
 
 
 def test_a_page_without_hotspots_has_no_marks_and_no_scale(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import threading
 from pathlib import Path
 
@@ -126,11 +127,53 @@ def test_a_page_draws_a_node_or_its_parent(tmp_path: Path) -> None:
         assert psnr(pixels(tab), whole) >= 45.0
 
 
+def test_nodes_out_of_sight_give_way(tmp_path: Path) -> None:
+    """Two balls far apart, room for one of them: each is whole when it is seen."""
+    ball = ball_of_splats(1000)
+    field = joined([ball, dataclasses.replace(ball, means=ball.means + np.float32([40, 0, 0]))])
+    views = [
+        Camera.look_at((x, -4.0, 0.4), (x, 0, 0), (0, 0, 1), width=SIZE, height=SIZE, fov_x=0.7)
+        for x in (0.0, 40.0)
+    ]
+    scene = dataclasses.replace(scene_of_splats(), field=field, cameras={"test": (views[0],)})
+    with pytest.raises(CagefieldError, match="the budget is 739 splats; give 740 at least"):
+        encode_page_nodes(field, coarse=COARSE, node=NODE, budget=739)
+    files = encode_page_nodes(
+        field, background=scene.background, coarse=COARSE, node=NODE, budget=COARSE + 2 * NODE
+    )
+    header, _ = unpack(files.coarse, MAGIC, VERSION, "splats")
+    assert sorted(entry["bounds"][0][0] > 20.0 for entry in header["nodes"]) == [False] * 2 + [True] * 2
+    page = dataclasses.replace(
+        ScenePage.build(scene, "levels"), files={"field": files.coarse}, nodes=files.nodes
+    )
+    write_folder(tmp_path, page.folder())
+    whole = [rendered(scene, view) for view in views]
+    with web_server(tmp_path, {}, threading.Event()) as link, shown(f"{link}/{INDEX}", size=SIZE) as tab:
+        tab.emulate_media(reduced_motion="reduce")
+        settle(tab)
+        assert psnr(pixels(tab), whole[0]) >= 45.0
+        for number in (1, 0):
+            view = {"c2w": views[number].c2w.ravel().tolist(), "fov_y_deg": math.degrees(0.7)}
+            fly = "([view, at]) => cagefieldViewer.viewer.flyTo(view, at)"
+            tab.evaluate(fly, [view, [40.0 * number, 0, 0]])
+            until(tab, "!cagefieldViewer.viewer.flies")
+            close = -1.0
+            for _ in range(100):  # details arrive after the first complete picture
+                settle(tab)
+                close = psnr(pixels(tab), whole[number])
+                if close >= 45.0:
+                    break
+                tab.wait_for_timeout(100)
+            assert close >= 45.0
+            assert tab.evaluate("cagefieldViewer.viewer.renderer.count") <= COARSE + 2 * NODE
+
+
 def test_the_command_says_where_levels_belong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene_of_splats().save(tmp_path / "scene")
     export = ["export", str(tmp_path / "scene"), "-o"]
     assert "give --embed" in refused(capsys, *export, str(tmp_path / "a.html"), "--levels")
     assert "give --embed" in refused(capsys, *export, str(tmp_path / "a.ply"), "--levels")
+    assert "give --levels, too" in refused(capsys, *export, str(tmp_path / "s"), "--embed", "--budget", "9")
     small = refused(capsys, *export, str(tmp_path / "site"), "--embed", "--levels")
     assert "the scene has 2000 splats and a coarse level" in small
     assert "a page of" in printed(capsys, *export, str(tmp_path / "site"), "--embed")

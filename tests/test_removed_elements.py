@@ -14,6 +14,7 @@ from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError, EditError, SceneError
 from cagefield.exporting import edited_splats
 from cagefield.fields.splat_field import SplatField
+from cagefield.formats.splats.splat_files import read_splats
 from cagefield.geometry.cage import Cage
 from cagefield.pages.page_splat_edits import decode_page_splat_edits
 from cagefield.pages.page_splats import page_order
@@ -26,7 +27,7 @@ from cagefield.selection.selection_files import dump_selection, parse_selection
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
-from cagefield.server.render_queue.splat_downloads import write_edited
+from cagefield.server.render_worker.edited_splats import EditedSplats, write_edited
 from cagefield.server.render_worker.page_files import PageFiles
 from cagefield.server.render_worker.refinement import Refinement
 from cagefield.server.render_worker.renderer_cache import RendererCache
@@ -116,8 +117,10 @@ def test_pictures_picks_and_downloads_are_of_what_is_left(scene: Path, tmp_path:
         expected = RendererCache(oracle).still(Shown(values_of(edits)), CAMERA, Display()).rgb
         np.testing.assert_array_equal(found, expected)
     assert not np.allclose(renderers.still(Shown(()), CAMERA, Display()).rgb, found, atol=0.1)
-    count = write_edited(str(scene), (), True, str(tmp_path / "out" / "rest.ply"), ball)
-    assert count == ball.total - ball.count
+    write_edited(
+        EditedSplats(str(scene), "scene", "ply", (), removed=ball), str(tmp_path / "out" / "rest.ply")
+    )
+    assert len(read_splats(tmp_path / "out" / "rest.ply")) == ball.total - ball.count
 
 
 def test_pages_hide_deleted_splats_beside_what_edits_change(scene: Path) -> None:

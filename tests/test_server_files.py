@@ -6,7 +6,8 @@ import asyncio
 import contextlib
 import os
 import tempfile
-from collections.abc import AsyncIterator, Iterator
+import zipfile
+from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -15,11 +16,13 @@ import numpy as np
 import pytest
 from starlette.types import Message
 
+from cagefield.cameras.camera import Camera
 from cagefield.compute.kernel_cache import kernel_cache
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.formats.splats.splat_files import read_splats, write_splats
 from cagefield.scene.scene import Scene
 from cagefield.server.editor.persistence import SceneStore, stem_of
+from cagefield.server.protocol.client_messages import ExportSplats
 from cagefield.server.render_worker.subprocess_task import run_in_process
 from cagefield.server.web import splat_file_scene, uploads
 from cagefield.server.web.app import application
@@ -30,6 +33,7 @@ from editor_server import EditorServer, PageClient, editor_server, page
 from scenes import ball_scene
 from splat_damage import ksplat_of
 from splat_scenes import ball_of_splats, random_splats, splat_scene
+from tiers import nightly_after_first
 
 EDIT = (
     "version: 1\nedits:\n  - name: ball\n    inner: {center: [0, 0, 0], size: 1.2}\n"
@@ -382,12 +386,54 @@ def test_an_export_can_be_stopped(server: EditorServer) -> None:
         )
 
 
+def keyframe(parts: dict[str, float]) -> dict[str, Any]:
+    """A keyframe of the protocol, one second before the next."""
+    camera = Camera.look_at((0, -3, 0.5), (0, 0, 0), width=16, height=9, fov_x=0.8)
+    return {"c2w": camera.c2w.ravel().tolist(), "fov_y_deg": 40.0, "seconds": 1.0, "parts": parts}
+
+
+@pytest.mark.parametrize("form", nightly_after_first(["ply", "usdc"]))
+def test_frames_of_the_camera_path_download_as_their_videos_show_them(
+    server: EditorServer, tmp_path: Path, form: str
+) -> None:
+    """Five frames; an edit that is hidden and one that changes nothing have no number in between."""
+    if form == "usdc":
+        pytest.importorskip("pxr.Usd", reason="USD is read by usd-core (extra usd)")
+    idle = EDIT.split("edits:\n")[1].replace("[3, 0, 0]", "[0, 0, 0]").replace("ball", "idle")
+    with page(server) as (client, _):
+        client.send("export", form=form, along_path=True)
+        told = client.until(lambda m: m["type"] == "notice" and m["level"] == "error")
+        assert "a camera path needs at least one keyframe" in told["text"]
+        client.send("load_edits", text=EDIT.replace("edits:\n", "edits:\n" + idle), append=False)
+        client.state(lambda state: len(state["edits"]) == 2)
+        client.send("set_path", keys=[keyframe({"2": 0.0}), keyframe({"2": 1.0})])
+        client.send("export", form=form, along_path=True, fps=4)
+        job = done(client)
+        steps = [m["done"] for m in client.messages if m["type"] == "job" and m["job"] == job["job"]]
+        name = "ball.ply.zip" if form == "ply" else "ball.usdc"
+        assert (job["state"], job["out"], job["total"]) == ("done", name, 5)
+        assert steps[0] == 0 and steps[-1] == 5 and steps == sorted(steps) and len(set(steps)) > 2
+        address = f"http://localhost:{server.port}/exports/{job['job']}/{name}"
+        (tmp_path / name).write_bytes(httpx.get(address, headers=server.headers).content)
+    if form == "ply":
+        with zipfile.ZipFile(tmp_path / name) as archive:
+            assert archive.namelist() == [f"ball_{n:04d}.ply" for n in range(5)]
+            archive.extractall(tmp_path)
+        frames = [read_splats(tmp_path / f"ball_{n:04d}.ply") for n in range(5)]
+    else:
+        frames = [read_splats(tmp_path / name, time_code=n) for n in range(5)]
+    for frame, part in zip(frames, (0.0, 0.25, 0.5, 0.75, 1.0), strict=True):
+        expected = ball_of_splats().means + np.float32([3 * part, 0, 0])
+        found = frame.means[np.lexsort(frame.means.T)]
+        np.testing.assert_allclose(found, expected[np.lexsort(expected.T)], atol=2e-6)  # float32 at 3.5
+
+
 def test_voxels_have_no_splats_to_download(tmp_path: Path) -> None:
     ball_scene().save(tmp_path / "voxels")
     coordinator, hello = open_scene(tmp_path / "voxels")
     assert not hello.splats
     with pytest.raises(CagefieldError, match="the scene holds voxels; `cagefield export SCENE"):
-        coordinator.background.export(1, "spz")
+        coordinator.background.export(1, ExportSplats(form="spz"))
 
 
 # ---- a process for each ----
@@ -399,3 +445,16 @@ def test_work_in_its_own_process_returns_raises_and_is_lost_in_one_line() -> Non
         asyncio.run(run_in_process(divmod, 1, 0))
     with pytest.raises(CagefieldError, match="the process that did this ended"):
         asyncio.run(run_in_process(os._exit, 3))
+
+
+def in_thirds(text: str, *, on_progress: Callable[[float], None]) -> str:
+    """Work that reports its progress."""
+    for number in range(1, 4):
+        on_progress(number / 3)
+    return text
+
+
+def test_work_in_its_own_process_reports_its_progress() -> None:
+    shares: list[float] = []
+    assert asyncio.run(run_in_process(in_thirds, "abc", on_progress=shares.append)) == "abc"
+    assert shares == [1 / 3, 2 / 3, 1.0]

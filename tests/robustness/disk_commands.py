@@ -43,6 +43,7 @@ def sources(folder: Path) -> None:
     if importlib.util.find_spec("torch") is not None:
         write_checkpoints(folder, splats=4000)
     (folder / "e.yaml").write_text(EDITS)
+    (folder / "grade.yaml").write_text(EDITS.replace("operations", "grade: {hue_deg: 40}\n    operations"))
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,7 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
     "edit --overwrite": DiskCommand("edit {out} {s}/e.yaml", "scene", on_disk="voxels"),
     "edit --append": DiskCommand("edit {out} {s}/e.yaml --append", "scene", on_disk="voxels"),
     "hotspot": DiskCommand("hotspot {out} --add top --at 0 0 0.5", "scene", on_disk="voxels"),
+    "edit, a grade": DiskCommand("edit {out} {s}/grade.yaml", "scene", on_disk="voxels"),
     "train, voxels": DiskCommand(_TRAIN + " --field voxel", "new"),
     "train, splats": DiskCommand("train {s}/photos -o {out} --steps 3 --field splat", "new"),
     "train, blocks": DiskCommand(
@@ -116,6 +118,9 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
     "export --embed": DiskCommand("export {s}/voxels -o {out} --as page --embed", "x"),
     "export, a sequence": DiskCommand(
         "export {s}/splats -o {out}/f_%04d.ply --camera-path {s}/path.json --fps 2", "frames", keeps=True
+    ),
+    "export, time samples": DiskCommand(
+        "export {s}/splats -o {out} --camera-path {s}/path.json --fps 2", "t.usda"
     ),
     "export, a mesh .ply": DiskCommand("export {s}/voxels -o {out} --as mesh", "m.ply"),
     "export, a mesh .glb": DiskCommand("export {s}/voxels -o {out} --as mesh", "m.glb"),

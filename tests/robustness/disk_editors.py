@@ -92,6 +92,11 @@ def _export(server: EditorServer, client: PageClient, number: int) -> Said:
     return said
 
 
+def _frames(server: EditorServer, client: PageClient, number: int) -> Said:
+    client.send("export", form="ply", along_path=True, fps=1)
+    return _until(client, _job)
+
+
 def _open(server: EditorServer, client: PageClient, number: int) -> Said:
     """Sends a file that no page has sent before."""
     with tempfile.TemporaryDirectory() as folder:
@@ -139,6 +144,7 @@ EDITORS: dict[str, EditorAction] = {
     "view, a video": EditorAction(_video, "r.mp4"),
     "view, pictures": EditorAction(_views, "views"),
     "view, an export": EditorAction(_export, "tmp", scene="splats"),
+    "view, an export of frames": EditorAction(_frames, "tmp", scene="splats"),
     "view, a file from a page": EditorAction(_open, "", scene="splats", comes_again=True),
 }
 """Files that an editor writes, by their words in the table."""

@@ -24,6 +24,7 @@ from kill_checks import (
     video_problem,
 )
 from kill_command import EDITS, Command, cli, put_free_form, put_scene, put_splats, renamed
+from kill_exports import EXPORTS, SLOW_EXPORTS
 from kill_lines import LINES, SLOW_LINES
 from kill_points import Say
 
@@ -319,6 +320,7 @@ COMMANDS: dict[str, Command] = {
     "save as": Command(put_scene, _save_as, new_problem),
     "edit --overwrite, renames": renamed(Command(put_scene, _edit, scene_problem)),
     **LINES,
+    **EXPORTS,
 }
 """Commands that write without kernels: a process for each kill takes a tenth of a second."""
 
@@ -337,5 +339,6 @@ SLOW_COMMANDS: dict[str, Command] = {
     "poses of a data set": _verifying,
     "poses of a data set, renames": renamed(_verifying, "data"),
     **SLOW_LINES,
+    **SLOW_EXPORTS,
 }
 """Others: seconds for each kill."""

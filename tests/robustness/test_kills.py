@@ -38,6 +38,8 @@ pytestmark = [
         ("save as", 15, 5),
         ("convert .sog", 8, 4),
         ("export .glb", 8, 4),
+        ("hotspot", 4, 2),
+        ("export, a sequence", 12, 5),
     ],
 )
 def test_killed_at_a_call_that_writes(tmp_path: Path, name: str, least: int, step: int) -> None:

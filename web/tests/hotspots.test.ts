@@ -1,6 +1,5 @@
 import { expect, test } from "vitest";
-import { nodePriority, takeNext } from "../src/splats/node_order";
-import type { SplatNode } from "../src/splats/splat_file";
+import { placeAt } from "../src/viewer/camera_path";
 import { poseBetween } from "../src/viewer/flight";
 import { projectPoint } from "../src/viewer/hotspots";
 import { roundLength } from "../src/viewer/scale_bar";
@@ -45,31 +44,32 @@ test("a mark is seen before a surface and hidden behind it", () => {
   expect(at(Infinity, [3, 0, -2]).seen).toBe(false);
 });
 
+test("a mark goes with its part along the path, and is hidden where that is not there", () => {
+  const still = { c2w: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], fov_y_deg: 40 };
+  const path = { stills: [still, still, still], seconds: 2, loop: false };
+  const places: ([number, number, number] | null)[] = [null, [1, 0, 0], [3, 0, 2]];
+  expect(placeAt(places, path, 0)).toBeNull();
+  expect(placeAt(places, path, 0.5)).toBeNull();
+  expect(placeAt(places, path, 1)).toEqual([1, 0, 0]);
+  expect(placeAt(places, path, 1.5)).toEqual([2, 0, 1]);
+  expect(placeAt(places, path, 9)).toEqual([3, 0, 2]);
+  // Round a loop, between the last still and the first.
+  expect(
+    placeAt(
+      [
+        [0, 0, 0],
+        [1, 0, 0],
+        [4, 0, 0],
+      ],
+      { ...path, loop: true, seconds: 3 },
+      2.5,
+    ),
+  ).toEqual([2, 0, 0]);
+});
+
 test("the scale bar has a round length", () => {
   expect(roundLength(0.01)).toEqual({ label: "1 m", pixels: 100 });
   expect(roundLength(0.02)).toEqual({ label: "2 m", pixels: 100 });
   expect(roundLength(0.0004).label).toBe("5 cm");
   expect(roundLength(12).label).toBe("1 km");
-});
-
-test("nodes in the image come before larger ones beside it", () => {
-  const node = (x: number, size: number): SplatNode => ({
-    count: 1,
-    coarse: [0, 1],
-    bounds: [
-      [x - size, -size, -10 - size],
-      [x + size, size, -10 + size],
-    ],
-    url: String(x),
-    bytes: 1,
-  });
-  const c2w = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
-  const camera = { c2w, width: 100, height: 100, fx: 100, fy: 100, cx: 50, cy: 50 };
-  expect(nodePriority(node(0, 1), camera)).toBeGreaterThan(nodePriority(node(40, 2), camera));
-  expect(nodePriority(node(0, 1), camera)).toBeGreaterThan(nodePriority(node(0, 0.5), camera));
-  const left = [node(40, 2), node(0, 0.5), node(1, 1)];
-  expect([takeNext(left, camera), takeNext(left, camera), takeNext(left, camera)].map((n) => n?.url)).toEqual(
-    ["1", "0", "40"],
-  );
-  expect(takeNext(left, camera)).toBeUndefined();
 });

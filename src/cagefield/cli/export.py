@@ -52,6 +52,9 @@ class Export:
     levels: Flag = False
     """With --embed, of splats: levels of detail. A coarse level shows first, and details come where the
     camera looks. Edits are baked in."""
+    budget: int | None = None
+    """With --levels: most splats that a page holds at a time; details that it has not shown for longest give
+    way. Left out, as many as the browser's GPU has room for."""
     selection: str | None = None
     """Only a cage's content: an edit's name (its inner cage, where the edit has taken it), an edit file, or
     a cage such as '{center: [0, 0, 1], size: 2}'."""
@@ -94,8 +97,10 @@ class Export:
             return self._sequence()
         if self.embed or self.out.suffix.lower() == ".html":
             return self._page()
-        if self.levels:
-            raise CagefieldError("--levels is for a page; give --embed and the name of a folder")
+        if self.levels or self.budget is not None:
+            raise CagefieldError(
+                "--levels and --budget are for a page; give --embed and the name of a folder"
+            )
         self._check()
         from cagefield.compute import devices
         from cagefield.exporting import cages_of
@@ -126,6 +131,8 @@ class Export:
             raise CagefieldError(
                 "--levels writes files beside the page; give --embed and the name of a folder"
             )
+        if self.budget is not None and not self.levels:
+            raise CagefieldError("--budget is for levels of detail; give --levels, too")
         if self.embed and self.out.suffix.lower() == ".html":
             raise CagefieldError(f"{self.out}: --embed writes a folder; give a name without .html")
         export_page(
@@ -134,6 +141,7 @@ class Export:
             self.device,
             embed=self.embed,
             levels=self.levels,
+            budget=self.budget,
             overwrite=self.overwrite,
         )
 

@@ -18,13 +18,21 @@ LARGE_PAGE_BYTES = 25e6
 
 
 def export_page(
-    folder: Path, out: Path, device: Device, *, embed: bool, levels: bool, overwrite: bool
+    folder: Path,
+    out: Path,
+    device: Device,
+    *,
+    embed: bool,
+    levels: bool,
+    overwrite: bool,
+    budget: int | None = None,
 ) -> None:
     """Write a page of the scene in `folder`, and print its contents.
 
     Args:
         embed: whether `out` is a folder, whose field is a file of its own.
         levels: whether splats have levels of detail.
+        budget: maximum number of splats that a page with levels holds at a time.
 
     Raises:
         CagefieldError: no scene, or a file that is there without `overwrite`.
@@ -50,6 +58,7 @@ def export_page(
             keys,
             loop=loop,
             levels=levels,
+            budget=budget,
             on_progress=lambda done: move(done, 1.0, ""),
         )
     if embed:

@@ -62,12 +62,17 @@ def encode_page_nodes(
     background: tuple[float, float, float] | None = (1.0, 1.0, 1.0),
     coarse: int = COARSE_SPLATS,
     node: int = NODE_SPLATS,
+    budget: int | None = None,
     on_progress: Callable[[float], None] = lambda done: None,
 ) -> NodeFiles:
     """Files of a field with levels of detail: about `coarse` splats, then nodes of at most `node` splats.
 
+    A page holds at most `budget` splats at a time, the coarse ones too, if given: nodes that it has least
+    recently shown give way to those in its image.
+
     Raises:
-        CagefieldError: a field of no more than `coarse` splats, which needs no levels; one of discs.
+        CagefieldError: a field of no more than `coarse` splats, which needs no levels; one of discs; a budget
+            without room for a node.
     """
     if field.discs:
         raise CagefieldError("the scene's splats are discs (2DGS), which pages do not draw")
@@ -99,13 +104,24 @@ def encode_page_nodes(
         parents.append(parent)
         on_progress((number + 1) / len(parts))
     together = _joined(parents, field)
-    header = {"count": first + len(field), "nodes": entries}
+    header: dict[str, Any] = {"count": first + len(field), "nodes": entries}
+    if budget is not None:
+        least = first + max(map(len, parts))
+        if budget < least:
+            raise CagefieldError(
+                f"the budget is {budget} splats; give {least} at least: the coarse level and one node"
+            )
+        header["budget"] = budget
     return NodeFiles(_file(together, field, center, steps, background, header), files)
 
 
 def node_rows(field: SplatField, node: int) -> list[NDArray[np.int64]]:
-    """Rows of each node, at most `node` of them: consecutive ones along a Morton curve."""
-    codes = morton_codes(field.means, field.means.min(axis=0), field.means.max(axis=0))
+    """Rows of each node, at most `node` of them: consecutive ones along a Morton curve.
+
+    The curve's cells are cubes, so that nodes of an elongated scene are compact.
+    """
+    low, high = field.means.min(axis=0), field.means.max(axis=0)
+    codes = morton_codes(field.means, low, low + (high - low).max())
     order = np.argsort(codes, kind="stable")
     return np.array_split(order, -(-len(field) // node))
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from cagefield.cameras.camera import Camera
-from cagefield.cameras.keyframes import Keyframe, stills
+from cagefield.cameras.keyframes import Keyframe, Still, stills
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
 from cagefield.exporting import edited_splats
@@ -26,6 +26,7 @@ from cagefield.files.atomic import recover_folder, replaced_folder
 from cagefield.pages.page_edits import encode_page_edits, for_pages
 from cagefield.pages.page_field import encode_page_field
 from cagefield.pages.page_file import bytes_until
+from cagefield.pages.page_hotspots import hotspot_entries
 from cagefield.pages.page_nodes import NODE_NAME, encode_page_nodes
 from cagefield.pages.page_splat_edits import encode_page_splat_edits
 from cagefield.pages.page_splats import encode_page_splats
@@ -35,8 +36,6 @@ from cagefield.rendering.splats.raster_splats import changed_splats
 from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.splats.splitting import split_of
 from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
-from cagefield.scene.hotspot_motion import visible_hotspots
-from cagefield.scene.hotspots import Hotspot, resolved_view
 from cagefield.scene.scene import Scene
 
 _HERE = files("cagefield.pages")
@@ -79,14 +78,15 @@ class ScenePage:
         loop: bool = False,
         step: float = 0.5,
         levels: bool = False,
+        budget: int | None = None,
         on_progress: Callable[[float], None] = lambda done: None,
     ) -> ScenePage:
         """The page of an edited scene, with the camera path of `keys`.
 
         `step` is the distance between samples in voxels. With `levels`, splats get levels of detail, for a
         folder (`page_nodes`): edits are baked in, so that the page does not show the scene before them, and
-        stand still along the path. `on_progress` is told how much is done of the edits along the path, or of
-        the levels.
+        stand still along the path; the page holds at most `budget` of its splats at a time, if given.
+        `on_progress` is told how much is done of the edits along the path, or of the levels.
 
         Raises:
             CagefieldError: the scene holds discs (2DGS).
@@ -100,7 +100,7 @@ class ScenePage:
                     "the scene holds voxels, whose pages have levels already; leave out --levels"
                 )
             coarse, nodes = encode_page_nodes(
-                edited_splats(scene), background=scene.background, on_progress=on_progress
+                edited_splats(scene), background=scene.background, budget=budget, on_progress=on_progress
             )
             found, along = {"field": coarse}, None
         elif isinstance(field, SplatSet):
@@ -121,9 +121,9 @@ class ScenePage:
             "path": _path(keys, loop),
             "extent": 2.0 * float(np.linalg.norm(scene.field.half_size)),
         }
-        hotspots = visible_hotspots(scene)
-        if hotspots:
-            header["hotspots"] = _hotspots(scene, hotspots)
+        # With levels the edits are baked in, and nothing moves along the path.
+        if entries := hotspot_entries(scene, () if levels else _stills(keys, loop)):
+            header["hotspots"] = entries
         if scene.alignment.meters_per_unit is not None:
             header["meters_per_unit"] = scene.alignment.meters_per_unit
         return cls(title, header, found, along, nodes)
@@ -238,24 +238,16 @@ def _view(camera: Camera) -> dict[str, Any]:
     return {"c2w": camera.c2w.ravel().tolist(), "fov_y_deg": math.degrees(2.0 * math.atan(0.5 * least))}
 
 
-def _hotspots(scene: Scene, hotspots: tuple[Hotspot, ...]) -> list[dict[str, Any]]:
-    """Texts, positions and views of hotspots in the edited scene."""
-    first, up = scene.first_camera, scene.up
-    views = [resolved_view(hotspot, first, up) for hotspot in hotspots]
-    return [
-        {
-            "title": hotspot.title,
-            "text": hotspot.text,
-            "position": list(hotspot.position),
-            "view": {"c2w": list(view.c2w), "fov_y_deg": view.fov_y_deg},
-        }
-        for hotspot, view in zip(hotspots, views, strict=True)
-    ]
-
-
 def _path(keys: tuple[Keyframe, ...], loop: bool) -> dict[str, Any] | None:
     if len(keys) < 2:
         return None
-    pictures = stills(keys, loop=loop, fps=STILLS_A_SECOND, width=100, height=100)
+    pictures = _stills(keys, loop)
     seconds = sum(key.seconds for key in (keys if loop else keys[:-1]))
     return {"stills": [_view(still.camera) for still in pictures], "seconds": seconds, "loop": loop}
+
+
+def _stills(keys: tuple[Keyframe, ...], loop: bool) -> tuple[Still, ...]:
+    """Images of the path between which the page goes straight; none for fewer than two keyframes."""
+    if len(keys) < 2:
+        return ()
+    return stills(keys, loop=loop, fps=STILLS_A_SECOND, width=100, height=100)

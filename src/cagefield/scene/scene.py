@@ -49,6 +49,7 @@ from cagefield.fields.splat_field import NO_OFFSET, Offset, SplatField
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.files.atomic import replaced_file, replaced_folder
 from cagefield.files.safe_open import real_path
+from cagefield.files.stale_files import remove_leftovers
 from cagefield.images.render_result import Background, RenderResult, background_rgb
 from cagefield.scene.alignment import Alignment
 from cagefield.scene.hotspots import Hotspot, check_count
@@ -315,6 +316,7 @@ class Scene:
             self.alignment,
             self.hotspots,
         )
+        remove_leftovers(folder / MANIFEST)
         with replaced_file(folder / MANIFEST, parents=False) as draft:
             write_json(manifest_document(manifest), draft)
             yield

@@ -13,8 +13,10 @@ export interface LoadOptions {
   openBeside?: (url: string) => Promise<ReadableStream<Bytes>>;
   /** Called when details have replaced coarse parts of the scene. */
   onDetails?: () => void;
-  /** Called where the GPU has no room for so many of the nodes of the scene's details. */
+  /** Called where there is no room for so many of the nodes of details in the image. */
   onCoarse?: (nodes: number, of: number) => void;
+  /** Called where details could not be loaded after the scene was complete, with the reason. */
+  onFailure?: (reason: string) => void;
   /** Called when a level can be drawn, from coarse to fine; levels are numbered from 1. */
   onLevel?: (number: number, count: number) => void;
 }

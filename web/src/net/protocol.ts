@@ -342,10 +342,16 @@ export interface Drawing {
 }
 /**
  * Writes the edited splats, the edits baked in, to a file to be downloaded; in the background.
+ *
+ * With `along_path`, those of each frame of the camera path: time samples of a USD file, else a zip archive
+ * of a file for each frame. Splats beyond the number `splats` are merged, those of a moment alone.
  */
 export interface ExportSplats {
   type: "export";
   form: "ply" | "compressed.ply" | "spz" | "sog" | "splat" | "glb" | "usda" | "usdc" | "usdz";
+  splats?: number | null;
+  along_path?: boolean;
+  fps?: number;
 }
 /**
  * Shrinks the inner cage to the dense region inside it.

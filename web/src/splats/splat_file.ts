@@ -42,6 +42,8 @@ export interface SplatHeader {
   levels: number[];
   /** Nodes with the details of the coarse level; absent without levels of detail. */
   nodes?: SplatNode[];
+  /** Maximum number of splats in memory, the coarse level's too; absent where the GPU's memory alone limits it. */
+  budget?: number;
 }
 
 /** The splats of a level, numbered from `first` on. */

@@ -24,7 +24,7 @@ import { haveSameDepths, Sorter } from "./sorter";
 import { sortDepths } from "./splat_camera";
 import { CHANGED_WORDS } from "./splat_edits";
 import type { SplatEdits } from "./splat_edits";
-import { takeNext } from "./node_order";
+import { NodeLoader } from "./node_loader";
 import { readSplatLevels } from "./splat_file";
 import type { SplatNode } from "./splat_file";
 import { SplatPasses } from "./splat_passes";
@@ -59,6 +59,8 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
   private readonly sorters = { before: new Sorter(), after: new Sorter() };
   private passes: SplatPasses;
   private store: SplatStore | null = null;
+  /** Loader of details that are not all stored; null before the first view is complete, and without details. */
+  private loader: NodeLoader | null = null;
   private changed: ChangedSplats | null = null;
   /** The sorted set of the edits that are shown next. */
   private prepared: { edits: SplatEdits; set: SplatSet; own: SplatSet } | null = null;
@@ -112,11 +114,13 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
 
   setCamera(camera: PinholeCamera): void {
     this.camera = camera;
+    this.loader?.look(camera);
   }
 
   /** Loads splats; a later call replaces one in progress. Throws `TooLarge` beyond the memory limit. */
   async load(source: ReadableStream<Bytes> | ArrayBuffer, options: LoadOptions = {}): Promise<void> {
     const turn = ++this.loading;
+    this.loader = null;
     const wanted = (): boolean => turn === this.loading;
     let number = 0;
     let store: SplatStore | null = null;
@@ -159,48 +163,11 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     options: LoadOptions,
     wanted: () => boolean,
   ): Promise<void> {
-    const left = [...nodes];
-    let coarse = 0;
-    let arrived = coarseBytes;
-    let applying: Promise<void> = Promise.resolve();
-    let isApplying = false;
-    let storing: Promise<void> = Promise.resolve();
-    const apply = (): void => {
-      if (isApplying) return;
-      isApplying = true;
-      applying = this.applyNodes(store, wanted).finally(() => {
-        isApplying = false;
-        if (wanted()) options.onDetails?.();
-      });
-    };
-    const loadOne = async (node: SplatNode): Promise<void> => {
-      let before = 0;
-      const count = (bytes: number): void => {
-        arrived += bytes - before;
-        before = bytes;
-        options.onArrival?.(arrived);
-      };
-      for await (const level of readSplatLevels(await open(node.url), () => undefined, count)) {
-        storing = storing.then(async () => {
-          if (!wanted()) return;
-          if (store.hasRoomFor(level.count)) await store.storeNode(level, node.coarse, wanted);
-          else coarse += 1;
-        });
-        await storing;
-      }
-      apply();
-    };
-    const loadRest = async (): Promise<void> => {
-      for (let node = takeNext(left, this.camera); node && wanted(); node = takeNext(left, this.camera))
-        if (store.hasRoomFor(node.count)) await loadOne(node);
-        else coarse += 1;
-    };
-    // The next node is on its way while one is decoded.
-    await Promise.all([loadRest(), loadRest()]);
-    await applying;
-    await this.applyNodes(store, wanted);
+    const apply = (): Promise<void> => this.applyNodes(store, wanted);
+    const loader = new NodeLoader(store, nodes, open, apply, options, wanted, coarseBytes);
+    await loader.load(() => this.camera);
     if (!wanted()) return;
-    if (coarse > 0) options.onCoarse?.(coarse, nodes.length);
+    this.loader = loader;
     this.level = { field: { background: store.header.background }, last: true };
     options.onLevel?.(2, 2);
   }
@@ -222,7 +189,14 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     this.viewPasses.forget();
     this.passes = new SplatPasses(gl, this.targets, chooseFormats(gl));
     const turn = ++this.loading;
-    await store?.restore(() => turn === this.loading);
+    const { loader } = this;
+    const wanted = (): boolean => turn === this.loading;
+    this.loader = null;
+    await store?.restore(wanted);
+    if (loader !== null && wanted()) {
+      loader.wanted = wanted;
+      this.loader = loader;
+    }
     this.setEdits(changed?.edits ?? null);
   }
 

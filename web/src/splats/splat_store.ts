@@ -3,7 +3,7 @@ import { TooLarge } from "../field/atlas";
 import type { SplatSet } from "./depth_order";
 import { PROJECTED_TEXELS } from "./project_glsl";
 import { harmonicWords, RECORD_WORDS } from "./splat_file";
-import type { SplatHeader, SplatLevel } from "./splat_file";
+import type { SplatHeader, SplatLevel, SplatNode } from "./splat_file";
 import { WordTexture } from "./splat_textures";
 
 type GL = WebGL2RenderingContext;
@@ -22,10 +22,12 @@ export class SplatStore {
   readonly capacity: number;
   /** Number of splats that are stored; those of nodes are drawn from the next `applyNodes` on. */
   private stored = 0;
-  /** Mask of the coarse splats that nodes have replaced; null without any. */
+  /** Mask of the coarse splats that nodes have replaced, and of places without a node; null before any. */
   private hidden: Uint8Array<ArrayBuffer> | null = null;
-  /** Coarse splats of nodes that are stored and not drawn yet. */
-  private readonly waiting: [number, number][] = [];
+  /** First and last splat, exclusive, of each stored node. */
+  private readonly places = new Map<SplatNode, [number, number]>();
+  /** Whether the stored nodes are others than those of the last set. */
+  private isOutdated = false;
   private readonly means: Float32Array<ArrayBuffer>;
   private readonly words: Uint32Array<ArrayBuffer>;
   private readonly harmonicWords: Uint32Array<ArrayBuffer>;
@@ -40,7 +42,8 @@ export class SplatStore {
     const coefficients = harmonicWords(degree);
     const splatBytes = 4 * (RECORD_WORDS + coefficients) + PROJECTED_BYTES;
     // Nodes without room stay coarse.
-    const count = header.nodes ? Math.min(header.count, Math.floor(limit / splatBytes)) : header.count;
+    const room = Math.min(Math.floor(limit / splatBytes), header.budget ?? Infinity);
+    const count = header.nodes ? Math.min(header.count, room) : header.count;
     this.capacity = count;
     this.bytes = splatBytes * count;
     if (this.bytes > limit)
@@ -72,14 +75,8 @@ export class SplatStore {
     await this.upload(level.first, level.first + level.count, wanted);
   }
 
-  /** Whether a node fits beside those that are stored. */
-  hasRoomFor(count: number): boolean {
-    return this.stored + count <= this.capacity;
-  }
-
-  /** Stores the splats of a node; `applyNodes` draws them in place of its coarse ones. */
-  async storeNode(level: SplatLevel, coarse: [number, number], wanted: () => boolean): Promise<void> {
-    const first = this.stored;
+  /** Stores the splats of a node from `first` on; `setWithNodes` has them in place of its coarse ones. */
+  async storeNode(level: SplatLevel, first: number, node: SplatNode, wanted: () => boolean): Promise<void> {
     const coefficients = harmonicWords(level.header.degree);
     this.means.set(level.means, 3 * first);
     this.words.set(level.records, RECORD_WORDS * first);
@@ -87,16 +84,26 @@ export class SplatStore {
     const end = first + level.count;
     await this.records.uploadRange(this.words, RECORD_WORDS * first, RECORD_WORDS * end, wanted);
     await this.harmonics.uploadRange(this.harmonicWords, coefficients * first, coefficients * end, wanted);
-    this.stored = end;
-    this.waiting.push(coarse);
+    this.stored = Math.max(this.stored, end);
+    this.places.set(node, [first, end]);
+    this.isOutdated = true;
   }
 
-  /** The set with all stored nodes in place of their coarse splats; null where none is new. */
+  /** Leaves a node out: `setWithNodes` has its coarse splats again. Its place may be used once that is drawn. */
+  dropNode(node: SplatNode): void {
+    this.isOutdated = this.places.delete(node) || this.isOutdated;
+  }
+
+  /** The set with all stored nodes in place of their coarse splats; null where it has not changed. */
   setWithNodes(): SplatSet | null {
-    if (this.waiting.length === 0) return null;
+    if (!this.isOutdated) return null;
+    this.isOutdated = false;
     const hidden = new Uint8Array(this.stored);
-    if (this.hidden) hidden.set(this.hidden);
-    for (const [first, end] of this.waiting.splice(0)) hidden.fill(1, first, end);
+    hidden.fill(1, this.header.levels[this.header.levels.length - 1]);
+    for (const [node, [first, end]] of this.places) {
+      hidden.fill(1, ...node.coarse);
+      hidden.fill(0, first, end);
+    }
     this.hidden = hidden;
     return { means: this.means.subarray(0, 3 * this.stored), hidden, changed: null };
   }

@@ -32,7 +32,8 @@ export interface Dialogs {
   element: HTMLElement;
   saveAs: () => void;
   paste: () => void;
-  download: () => void;
+  /** Asks for the format of the edited splats: as they are now, or of each frame of the camera path. */
+  download: (frames: boolean) => void;
   /** Asks how many meters a distance in units of the scene is. */
   scale: (distance: number) => void;
   /** Asks for the title and the text of a hotspot; `before` are its values so far. */
@@ -148,16 +149,37 @@ export function dialogs(app: App): Dialogs {
         },
       );
     },
-    download() {
-      const form = h("select", {}, ...FORMS.map(([value, label]) => h("option", { value }, label)));
-      ask(
-        "Download the edited splats",
-        "Download",
-        [h("label", { class: "field" }, h("span", {}, "File"), form)],
-        () => {
-          app.send({ type: "export", form: form.value as ExportSplats["form"] });
-        },
+    download(frames) {
+      const form = h(
+        "select",
+        { name: "form" },
+        ...FORMS.map(([value, label]) => h("option", { value }, label)),
       );
+      const fps = number(24, 1, 120);
+      fps.name = "fps";
+      const kind = h("p", { class: "quiet" });
+      const explain = (): void => {
+        kind.textContent = form.value.startsWith("usd")
+          ? "one file, its frames as time samples"
+          : "a .zip, a file for each frame";
+      };
+      form.onchange = explain;
+      explain();
+      const most = number(1, 1, 1e9);
+      Object.assign(most, { name: "splats", value: "", required: false, placeholder: "all" });
+      const fields = [field("File", form)];
+      if (!frames) fields.push(field("At most so many splats", most));
+      if (frames) fields.push(field("Frames per second", fps), kind);
+      const title = frames ? "Download the splats of each frame of the path" : "Download the edited splats";
+      ask(title, "Download", fields, () => {
+        app.send({
+          type: "export",
+          form: form.value as ExportSplats["form"],
+          along_path: frames,
+          fps: Number(fps.value),
+          splats: most.value === "" ? null : Number(most.value),
+        });
+      });
     },
     render(what) {
       const film = what === "camera_path";

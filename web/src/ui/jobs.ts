@@ -26,7 +26,8 @@ export function jobs(app: App): HTMLElement {
 
 function describeJob(job: Job): string {
   const file = job.what === "splats";
-  if (job.state === "running") return file ? `writing ${job.out}` : `${job.done} of ${job.total}`;
+  if (job.state === "running")
+    return file && job.total === 1 ? `writing ${job.out}` : `${job.done} of ${job.total}`;
   if (job.state === "done") return file ? `${job.out} is ready` : `written to ${job.out}`;
   return job.text || job.state;
 }
@@ -34,7 +35,7 @@ function describeJob(job: Job): string {
 function jobRow(app: App, job: Job): HTMLElement {
   const bar = h("progress", { max: Math.max(1, job.total) });
   // A progress bar without a value shows activity alone.
-  if (job.what !== "splats" || job.state !== "running") bar.value = job.done;
+  if (job.total > 1 || job.what !== "splats" || job.state !== "running") bar.value = job.done;
   const stop =
     job.state === "running"
       ? iconButton(X, "Cancel", () => app.send({ type: "cancel_job", job: job.job }), "cancel")

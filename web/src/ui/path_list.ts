@@ -9,7 +9,7 @@ import { h, icon, iconButton, iconLink, section } from "./dom";
 export function pathList(
   app: App,
   actions: Actions,
-  dialogs: { render: (what: "test_views" | "camera_path") => void },
+  dialogs: { render: (what: "test_views" | "camera_path") => void; download: (frames: boolean) => void },
 ): HTMLElement {
   const list = h("ol", { class: "keys" });
   const length = h("span", { class: "quiet" });
@@ -35,6 +35,16 @@ export function pathList(
     "button",
     { type: "button", class: "text", onclick: () => dialogs.render("camera_path") },
     "Render video…",
+  );
+  const frames = h(
+    "button",
+    {
+      type: "button",
+      class: "text",
+      title: "Edited splats of each frame: a sequence of files, or USD with time samples",
+      onclick: () => dialogs.download(true),
+    },
+    "Download frames…",
   );
   const file = iconLink(
     Download,
@@ -124,6 +134,8 @@ export function pathList(
     const total = pathDuration(state.keys, state.loop);
     length.textContent = state.keys.length === 0 ? "no keyframes" : `${total.toFixed(1)} s`;
     play.disabled = film.disabled = state.keys.length < 2;
+    frames.disabled = state.keys.length === 0;
+    frames.hidden = app.store.now.hello?.splats !== true;
     file.hidden = state.keys.length === 0;
     loop.classList.toggle("on", state.loop);
   });
@@ -141,7 +153,7 @@ export function pathList(
       length,
     ),
     list,
-    h("div", { class: "bar" }, film, views),
+    h("div", { class: "bar" }, film, frames, views),
   );
 }
 

@@ -72,7 +72,12 @@ export function topbar(
   const save = iconButton(Save, "Save (Ctrl+S)", () => actions.save(), "save");
   const saveAs = iconButton(SaveAll, "Save as… (Ctrl+Shift+S)", () => dialogs.saveAs(), "save-as");
   const load = iconButton(FolderOpen, "Load an edit file, or open splats…", () => file.click(), "load");
-  const splats = iconButton(FileDown, "Download the edited splats…", () => dialogs.download(), "download");
+  const splats = iconButton(
+    FileDown,
+    "Download the edited splats…",
+    () => dialogs.download(false),
+    "download",
+  );
   const panel = iconButton(PanelRight, "Panel (N)", () => actions.toggle("panel"), "panel-toggle");
   app.store.watch(["state", "hello", "view", "split", "grid", "panel", "mode"], (now) => {
     name.textContent = now.hello?.name ?? "";

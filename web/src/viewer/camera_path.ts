@@ -1,5 +1,6 @@
 /** Camera path of an exported scene: closely spaced views, interpolated linearly. */
 import { column, cross, poseMatrix, subtract, add, dot, normalize } from "./vectors";
+import type { Vec3 } from "./vectors";
 
 export interface View {
   c2w: number[];
@@ -12,14 +13,33 @@ export interface Path {
   loop: boolean;
 }
 
-/** The view at a time in seconds; after the end of a path without a loop, its last view. */
-export function viewAt({ stills, seconds, loop }: Path, time: number): View {
-  const share = seconds > 0 ? time / seconds : 1;
+/** The numbers of the stills before and after a time in seconds, and the share of the way between them. */
+function stillsAt(
+  { stills, seconds, loop }: Path,
+  time: number,
+): { one: number; other: number; share: number } {
+  const passed = seconds > 0 ? time / seconds : 1;
   const last = stills.length - 1;
-  const at = loop ? (share % 1) * stills.length : Math.min(share, 1) * last;
-  const one = stills[Math.min(Math.floor(at), last)];
-  const other = stills[loop ? (Math.floor(at) + 1) % stills.length : Math.min(Math.floor(at) + 1, last)];
-  const t = at - Math.floor(at);
+  const at = loop ? (passed % 1) * stills.length : Math.min(passed, 1) * last;
+  const one = Math.min(Math.floor(at), last);
+  const other = loop ? (Math.floor(at) + 1) % stills.length : Math.min(Math.floor(at) + 1, last);
+  return { one, other, share: at - Math.floor(at) };
+}
+
+/** The place of a point at a time, of its places at the path's stills; null where either neighbor has none. */
+export function placeAt(places: readonly (Vec3 | null)[], path: Path, time: number): Vec3 | null {
+  const { one, other, share } = stillsAt(path, time);
+  const from = places[one];
+  const to = places[other];
+  return from === null || to === null ? null : add(from, subtract(to, from), share);
+}
+
+/** The view at a time in seconds; after the end of a path without a loop, its last view. */
+export function viewAt(path: Path, time: number): View {
+  const found = stillsAt(path, time);
+  const one = path.stills[found.one];
+  const other = path.stills[found.other];
+  const t = found.share;
   const mixed = (n: number): [number, number, number] =>
     add(column(one.c2w, n), subtract(column(other.c2w, n), column(one.c2w, n)), t);
   const back = normalize(mixed(2));

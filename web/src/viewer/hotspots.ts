@@ -12,6 +12,8 @@ export interface Hotspot {
   text: string;
   position: Vec3;
   view: View;
+  /** Places at the stills of the camera path, null where it is not to be seen; absent for one that stays. */
+  along?: (Vec3 | null)[];
 }
 
 /** A mark is hidden where the surface is nearer by these shares of the hotspot's distance and of the scene. */
@@ -29,6 +31,8 @@ export interface HotspotHost {
   /** Diagonal of the scene's box, world units; 0 before the scene is there. */
   readonly extent: number;
   flyTo(view: View, around: Vec3): void;
+  /** Where the edits, as they are shown, carry a hotspot; null where it is not to be seen. */
+  place(hotspot: Hotspot): Vec3 | null;
 }
 
 /** Position of a point in CSS pixels of the canvas, and whether the camera sees it. */
@@ -109,7 +113,10 @@ export class HotspotMarks {
   /** Puts the marks where the camera sees their hotspots. */
   arrange(): void {
     this.marks.forEach((mark, index) => {
-      const { x, y, seen } = projectPoint(this.host, this.hotspots[index].position);
+      const place = this.host.place(this.hotspots[index]);
+      mark.hidden = true;
+      if (place === null) return;
+      const { x, y, seen } = projectPoint(this.host, place);
       mark.hidden = !seen;
       if (seen) mark.style.transform = `translate(${x}px, ${y}px)`;
     });

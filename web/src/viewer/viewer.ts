@@ -6,7 +6,7 @@ import { AdaptiveResolution, waitForGpu } from "../field/adaptive_resolution";
 import type { SceneDrawer } from "../field/scene_drawer";
 import type { Distances } from "../field/views";
 import { createDrawer, identifyScene, readMagic } from "../splats/drawer_selection";
-import { viewAt } from "./camera_path";
+import { placeAt, viewAt } from "./camera_path";
 import type { Path, View } from "./camera_path";
 import { poseBetween } from "./flight";
 import type { Pose } from "./flight";
@@ -62,6 +62,8 @@ export class SceneViewer {
   /** Number of frames shown. */
   pictures = 0;
   private playStart: number | null = null;
+  /** Seconds of the camera path whose edits are shown; null for the whole edits. */
+  private editTime: number | null = null;
   private flight: { from: Pose; to: Pose; begun: number; view: View; around: Vec3 } | null = null;
   /** Distances of the last image, read where there are hotspots; null before it. */
   distances: Distances | null = null;
@@ -120,7 +122,8 @@ export class SceneViewer {
     await renderer.load(source, {
       openBeside,
       onDetails: () => this.refresh(),
-      onCoarse: (nodes, of) => this.say(`The GPU has no room for the details of ${nodes} of ${of} parts.`),
+      onCoarse: (nodes, of) => this.say(`There is no room for the details of ${nodes} of ${of} parts.`),
+      onFailure: (reason) => this.say(reason),
       onArrival: (bytes) => this.progressed(Math.min(0.99, bytes / files.field.bytes)),
       onLevel: (number, count) => {
         this.say(number < count ? "Loading detail …" : "");
@@ -180,7 +183,7 @@ export class SceneViewer {
   /** Flies to a view; then the orbit's center is the point of its axis closest to `around`. */
   flyTo(view: View, around: Vec3): void {
     this.playStart = null;
-    if (this.edits !== undefined) this.renderer?.setEdits(this.edits);
+    this.showWholeEdits();
     const end = new Orbit(view.c2w, this.header.up, around);
     const { eye, target } = this.orbit;
     this.flight = {
@@ -203,7 +206,7 @@ export class SceneViewer {
   /** Shows the view in which the scene opens, with its complete edits. */
   home(): void {
     this.playStart = this.flight = null;
-    if (this.edits !== undefined) this.renderer?.setEdits(this.edits);
+    this.showWholeEdits();
     this.look(this.header.start);
   }
 
@@ -211,7 +214,20 @@ export class SceneViewer {
   seek(path: Path, seconds: number): void {
     const time = path.loop ? seconds % path.seconds : Math.min(seconds, path.seconds);
     if (this.pathEdits) this.renderer?.setEdits(this.pathEdits.at(time) ?? this.edits ?? null);
+    this.editTime = time;
     this.look(viewAt(path, time));
+  }
+
+  /** Where the shown edits carry a hotspot. */
+  place({ position, along }: Hotspot): Vec3 | null {
+    const { path } = this.header;
+    if (this.editTime === null || !path || along === undefined) return position;
+    return placeAt(along, path, this.editTime);
+  }
+
+  private showWholeEdits(): void {
+    this.editTime = null;
+    if (this.edits !== undefined) this.renderer?.setEdits(this.edits);
   }
 
   private get halfTangent(): number {

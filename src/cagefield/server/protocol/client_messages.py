@@ -300,10 +300,17 @@ class RenderJob(Message):
 
 
 class ExportSplats(Message):
-    """Writes the edited splats, the edits baked in, to a file to be downloaded; in the background."""
+    """Writes the edited splats, the edits baked in, to a file to be downloaded; in the background.
+
+    With `along_path`, those of each frame of the camera path: time samples of a USD file, else a zip archive
+    of a file for each frame. Splats beyond the number `splats` are merged, those of a moment alone.
+    """
 
     type: Literal["export"] = "export"
     form: SplatForm
+    splats: Annotated[int, Field(ge=1, le=10**9)] | None = None
+    along_path: bool = False
+    fps: Annotated[float, Field(ge=MIN_FPS, le=120)] = 24.0
 
 
 class CancelJob(Message):

@@ -14,7 +14,7 @@ from cagefield.server.editor.connected_edits import Wanted
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
-from cagefield.server.protocol import client_messages, common, server_messages
+from cagefield.server.protocol import client_messages, server_messages
 from cagefield.server.render_queue import jobs
 from cagefield.server.render_queue.dispatcher import BackgroundTask
 from cagefield.server.render_queue.jobs import Job
@@ -174,10 +174,11 @@ class BackgroundWork:
         self._jobs.append(job)
         self._tell(_message(job, "running"))
 
-    def export(self, page: int, form: common.SplatForm) -> None:
-        """Begins to write the edited splats for a page. Raises CagefieldError where there are none."""
+    def export(self, page: int, message: client_messages.ExportSplats) -> None:
+        """Begins to write the edited splats for a page. Raises CagefieldError where there are none, or no
+        keyframes for the frames of a path."""
         self._numbers += 1
-        self.exports.begin(self._numbers, page, form)
+        self.exports.begin(self._numbers, page, message)
 
     def cancel(self, number: int) -> None:
         """Ends a job. Raises CagefieldError where it is over already."""

@@ -8,17 +8,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from cagefield.edits import EditStack
+from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
+from cagefield.exporting.path_frames import CameraPath
 from cagefield.fields.splat_field import SplatField
 from cagefield.files.temporary_folders import TemporaryFolder
-from cagefield.selection.element_selection import Selection
 from cagefield.server.editor.persistence import SceneStore, stem_of
 from cagefield.server.editor.session import Session
-from cagefield.server.protocol import server_messages
-from cagefield.server.protocol.common import SplatForm
+from cagefield.server.protocol import client_messages, server_messages
+from cagefield.server.render_worker.edited_splats import EditedSplats, file_name, keys_of, write_edited
 from cagefield.server.render_worker.subprocess_task import run_in_process
-from cagefield.server.render_worker.tasks import EditValues, values_of
+from cagefield.server.render_worker.tasks import values_of
 
 MAX_KEPT_FILES = 4
 """Finished files that are kept for their download; older ones are removed."""
@@ -31,6 +31,8 @@ class _Export:
     number: int
     page: int
     name: str
+    frames: int = 1
+    done: int = 0
     task: asyncio.Task[None] | None = None
     is_done: bool = False
 
@@ -46,21 +48,25 @@ class Exports:
         self._folder: TemporaryFolder | None = None
         self._exports: dict[int, _Export] = {}
 
-    def begin(self, number: int, page: int, form: SplatForm) -> None:
-        """Begins to write the splats as they are now; the page is told when they are there.
+    def begin(self, number: int, page: int, message: client_messages.ExportSplats) -> None:
+        """Begins to write the splats as they are now, or those of each frame of the camera path.
 
-        Raises CagefieldError for a scene that has no splats.
+        The page is told when they are there.
+
+        Raises CagefieldError for a scene that has no splats, and for frames without a camera path.
         """
         if not isinstance(self._store.scene.field, SplatField):
             raise CagefieldError(
                 "the scene holds voxels; `cagefield export SCENE -o x.spz` fits splats to them"
             )
+        content = self._content(message)
+        frames = 1 if content.path is None else len(content.path.stills())
         if self._folder is None:
             self._folder = TemporaryFolder("export", tidy=False)
-        export = _Export(number, page, f"{self._name}.{form}")
+        export = _Export(number, page, file_name(self._name, message.form, content.path is not None), frames)
         self._exports[number] = export
         self._tell(_message(export, "running"))
-        export.task = asyncio.ensure_future(self._write(export))
+        export.task = asyncio.ensure_future(self._write(export, content))
 
     @property
     def _name(self) -> str:
@@ -96,21 +102,40 @@ class Exports:
         assert self._folder is not None  # made when the first export begins
         return self._folder.path / str(export.number) / export.name
 
-    async def _write(self, export: _Export) -> None:
+    def _content(self, message: client_messages.ExportSplats) -> EditedSplats:
+        """Content of a file: the edits as they are now, numbered from 1 along the path."""
         document = self._session.document
-        edits = tuple(entry.edit.without_parent for entry in document.applied if entry.edit.enabled)
-        edits = tuple(e for e in edits if e.changes_anything and self._session.problem(e) is None)
+        entries = [entry for entry in document.applied if self._is_shown(entry.edit)]
+        path = None
+        if message.along_path:
+            places = {entry.id: place for place, entry in enumerate(entries, start=1)}
+            path = CameraPath(keys_of(document.keys, places), document.loop, message.fps)
+        return EditedSplats(
+            str(self._store.origin),
+            self._name,
+            message.form,
+            values_of(tuple(entry.edit.without_parent for entry in entries)),
+            document.preserve_opacity,
+            document.removed,
+            document.meters_per_unit,
+            path,
+            message.splats,
+        )
+
+    def _is_shown(self, edit: Edit) -> bool:
+        edit = edit.without_parent
+        return edit.enabled and edit.changes_anything and self._session.problem(edit) is None
+
+    async def _write(self, export: _Export, content: EditedSplats) -> None:
+        def move(done: float) -> None:
+            frames = min(int(done * export.frames + 1e-6), export.frames)
+            if frames > export.done:
+                export.done = frames
+                self._tell(_message(export, "running"))
+
         path = self._path(export)
         try:
-            await run_in_process(
-                write_edited,
-                str(self._store.origin),
-                values_of(edits),
-                document.preserve_opacity,
-                str(path),
-                document.removed,
-                document.meters_per_unit,
-            )
+            await run_in_process(write_edited, content, str(path), on_progress=move)
         except asyncio.CancelledError:
             self._forget(export)
             self._tell(_message(export, "cancelled"))
@@ -129,37 +154,6 @@ class Exports:
         self._exports.pop(export.number, None)
 
 
-def write_edited(
-    scene: str,
-    edits: tuple[EditValues, ...],
-    preserve_opacity: bool,
-    out: str,
-    removed: Selection | None = None,
-    meters_per_unit: float | None = None,
-) -> int:
-    """Writes the splats of a scene's folder under other edits, without other elements, and in another scale
-    than its own; returns how many there are."""
-    import dataclasses
-
-    from cagefield.exporting import edited_splats, upright
-    from cagefield.exporting.similarity import aligned_splats
-    from cagefield.formats.splats.splat_files import write_splats
-    from cagefield.scene.removed_elements import without_removed
-    from cagefield.scene.scene import Scene
-
-    opened = Scene.open(scene, whole=True)
-    field = without_removed(opened.field, removed)
-    stack = EditStack(values.edit() for values in edits)
-    splats = edited_splats(
-        dataclasses.replace(opened, field=field, edits=stack, preserve_opacity=preserve_opacity)
-    )
-    Path(out).parent.mkdir(parents=True, exist_ok=True)
-    alignment = dataclasses.replace(opened.alignment, meters_per_unit=meters_per_unit)
-    aligned = aligned_splats(splats, dataclasses.replace(opened, alignment=alignment))
-    write_splats(upright(aligned, opened.up), out)
-    return len(splats)
-
-
 def _message(export: _Export, state: str, text: str = "") -> server_messages.Job:
     return server_messages.Job.model_validate(
         {
@@ -167,8 +161,8 @@ def _message(export: _Export, state: str, text: str = "") -> server_messages.Job
             "page": export.page,
             "what": "splats",
             "state": state,
-            "done": int(state == "done"),
-            "total": 1,
+            "done": export.frames if state == "done" else export.done,
+            "total": export.frames,
             "out": export.name,
             "text": text,
         }

@@ -404,7 +404,7 @@ class MessageHandlers:
 
     @_handles(client_messages.ExportSplats)
     def _export(self, message: client_messages.ExportSplats) -> None:
-        self._coordinator.background.export(self._page.number, message.form)
+        self._coordinator.background.export(self._page.number, message)
 
     @_handles(client_messages.CancelJob)
     def _cancel_job(self, message: client_messages.CancelJob) -> None:

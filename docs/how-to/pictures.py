@@ -1,0 +1,205 @@
+"""Pictures of the how-to pages: hotspots, frames of a path, decimation, a measured distance.
+
+    python docs/how-to/pictures.py hotspots SCENE      # in the editor, in a page, under an edit
+    python docs/how-to/pictures.py frames SCENE        # the dialog, and four frames of the exported USD
+    python docs/how-to/pictures.py measure SCENE       # two points measured in the editor
+    python docs/how-to/pictures.py decimated SCENE     # all splats, a quarter and a sixteenth
+
+SCENE is `biker.compressed.ply` of PlayCanvas' examples, imported; it is copied first and left as it is.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+
+import numpy as np
+from PIL import Image
+
+from cagefield import Camera, EditStack, Hotspot, Scene, load_edits
+from cagefield.cameras.keyframes import Keyframe
+from cagefield.exporting.path_frames import CameraPath
+from cagefield.exporting.usd_scenes import StageScene, write_scenes_usd
+from cagefield.fields.splat_decimation import decimate_splats
+from cagefield.fields.splat_field import SplatField
+from cagefield.formats.splats.splat_files import read_splats
+from cagefield.images.metrics import psnr
+from cagefield.pages.scene_page import ScenePage
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
+from cagefield.scene.hotspots import view_of_camera
+from chromium import chromium_context
+from editor_page import EditorPage, editor_page
+from editor_server import editor_server
+
+HERE = Path(__file__).parent
+HELMET = load_edits(HERE.parent / "edits" / "biker_larger_helmet.yaml")
+HELMET_PIXEL, KNEE_PIXEL = (150, 262), (190, 488)
+"""Pixels of the camera of `hotspots`."""
+PAGE_SPLATS = 50_000
+"""Splats of the scene in the browser, which draws in software."""
+
+
+def main() -> None:
+    """Runs a session."""
+    name, path = sys.argv[1:]
+    session = {"hotspots": hotspots, "frames": frames, "measure": measure, "decimated": decimated}[name]
+    with tempfile.TemporaryDirectory() as folder:
+        scene = Path(folder) / "biker"
+        shutil.copytree(path, scene)
+        session(Scene.open(scene), Path(folder))
+
+
+def hotspots(scene: Scene, folder: Path) -> None:
+    """The dialog of a hotspot; a page with an open card; both hotspots before and after an edit."""
+    camera = near(scene, 500, 560)
+    assert isinstance(scene.field, SplatField)
+    scene = dataclasses.replace(scene, field=decimate_splats(scene.field, PAGE_SPLATS))
+    text = "In his hand.\nHalf as large again after the edit."
+    helmet = Hotspot("Helmet", surface(scene, camera, HELMET_PIXEL), text)
+    knee = Hotspot(
+        "Knee slider", surface(scene, camera, KNEE_PIXEL), "Stays where it is.", view_of_camera(camera)
+    )
+    marked = dataclasses.replace(
+        scene,
+        hotspots=tuple(dataclasses.replace(hotspot, follows=True) for hotspot in (helmet, knee)),
+        cameras={"test": (camera,)},
+    )
+    parts = []
+    for edits in (EditStack(), HELMET):
+        parts.append(page_shot(marked.with_edits(edits), folder, "cagefieldViewer.hotspots.arrange()"))
+    beside(parts).save(HERE / "hotspots-edit.jpg", quality=85)
+    shown = page_shot(marked.with_edits(HELMET), folder, "cagefieldViewer.hotspots.open(0)")
+    shown.save(HERE / "hotspots-page.jpg", quality=85)
+    marked.save(folder / "marked")
+    with editor_server(folder / "marked") as server, editor_page(server.link, 1100, 680) as editor:
+        editor.ready()
+        editor.press("Shift+H")
+        box = editor.box
+        editor.page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+        editor.page.fill("dialog[open] input[name=title]", "Jacket")
+        editor.page.fill("dialog[open] textarea", "Leather, worn at the seams.")
+        screen(editor, "hotspots-editor")
+
+
+def frames(scene: Scene, folder: Path) -> None:
+    """The dialog of frames, and four frames of a USD file with time samples."""
+    camera = near(scene, 300, 380)
+    keys = tuple(Keyframe(tuple(camera.c2w.ravel().tolist()), 40.0, 1.0, {1: part}) for part in (0.0, 1.0))
+    edited = dataclasses.replace(scene.with_edits(HELMET), cameras={"test": (camera,)})
+    file = folder / "biker.usdc"
+    write_scenes_usd(file, [StageScene("biker", edited, edited.up)], CameraPath(keys, fps=3.0))
+    pictures = [drawn(read_splats(file, time_code=n), camera) for n in range(4)]
+    beside(pictures).save(HERE / "frames.jpg", quality=85)
+    edited.save(folder / "edited")
+    with editor_server(folder / "edited") as server, editor_page(server.link, 1100, 680) as editor:
+        editor.ready()
+        editor.changed(lambda: editor.press("k"))
+        editor.changed(lambda: editor.press("k"))
+        editor.page.click("text=Download frames…")
+        editor.page.select_option("dialog[open] select[name=form]", "usdc")
+        screen(editor, "frames-editor")
+
+
+def measure(scene: Scene, folder: Path) -> None:
+    """Two points of a surface, and the dialog that asks for the meters between them."""
+    dataclasses.replace(scene, cameras={"test": (near(scene, 500, 560),)}).save(folder / "near")
+    with editor_server(folder / "near") as server, editor_page(server.link, 1100, 680) as editor:
+        editor.ready()
+        editor.press("Shift+M")
+        box = editor.box
+        for count, (x, y) in enumerate(((0.5, 0.3), (0.5, 0.65)), start=1):
+            editor.page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
+            editor.until(f"cagefield.now.measured.length === {count}")
+        editor.page.fill("dialog[open] input[name=meters]", "0.6")
+        screen(editor, "measure")
+
+
+def decimated(scene: Scene, folder: Path) -> None:
+    """All splats, a quarter and a sixteenth, and the PSNR of the two."""
+    field, camera = scene.field, near(scene, 400, 460)
+    assert isinstance(field, SplatField)
+    pictures, whole = [], None
+    for share in (1, 4, 16):
+        fewer = decimate_splats(field, len(field) // share)
+        frame = SplatRenderer(fewer).render(camera, background="white")
+        assert frame is not None
+        whole = frame.rgb if whole is None else whole
+        print(f"{len(fewer)} splats" + (f", {psnr(frame.rgb, whole):.1f} dB" if share > 1 else ""))
+        pictures.append(Image.fromarray(frame.rgb8()))
+    beside(pictures).save(HERE / "decimated.jpg", quality=85)
+
+
+def near(scene: Scene, width: int, height: int) -> Camera:
+    """Camera before the upper body."""
+    first = scene.first_camera
+    target = np.array([-0.1, -1.2, 0.1])
+    away = first.origin - target
+    eye = target + 2.6 * away / np.linalg.norm(away)
+    return Camera.look_at(eye, target, scene.up, width=width, height=height, fov_x=0.62)
+
+
+def surface(scene: Scene, camera: Camera, at: tuple[int, int]) -> tuple[float, float, float]:
+    """Point of the surface at a pixel of a camera."""
+    depth = scene.render(camera).depth[at[1], at[0]]
+    ray = np.array([(at[0] + 0.5 - camera.cx) / camera.fx, (camera.cy - at[1] - 0.5) / camera.fy, -1.0])
+    x, y, z = (camera.origin + depth * (camera.c2w[:3, :3] @ ray) / np.linalg.norm(ray)).tolist()
+    return x, y, z
+
+
+def page_shot(scene: Scene, folder: Path, script: str) -> Image.Image:
+    """An exported page after a script, its picture whole."""
+    file = folder / "page.html"
+    file.write_text(ScenePage.build(scene, "biker").one_file(), encoding="utf-8")
+    with chromium_context(viewport={"width": 500, "height": 560}) as context:
+        page = context.new_page()
+        page.emulate_media(reduced_motion="reduce")
+        page.goto(file.as_uri())
+        whole(page)
+        page.evaluate(script)
+        page.wait_for_timeout(500)
+        whole(page)
+        return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+
+
+def whole(page: Any) -> None:
+    """Waits for the complete picture of the finest level."""
+    for _ in range(600):
+        if page.evaluate(
+            "Boolean(window.cagefieldViewer?.viewer?.renderer?.level?.last && cagefieldViewer.viewer.whole)"
+        ):
+            return
+        page.wait_for_timeout(300)
+    raise SystemExit("the page has drawn no complete picture")
+
+
+def drawn(field: SplatField, camera: Camera) -> Image.Image:
+    """Picture of splats over white."""
+    frame = SplatRenderer(field).render(camera, background="white")
+    assert frame is not None
+    return Image.fromarray(frame.rgb8())
+
+
+def beside(pictures: list[Image.Image]) -> Image.Image:
+    """Pictures of one height side by side."""
+    row = Image.new("RGB", (sum(picture.width for picture in pictures), pictures[0].height))
+    for number, picture in enumerate(pictures):
+        row.paste(picture, (number * picture.width, 0))
+    return row
+
+
+def screen(editor: EditorPage, name: str) -> None:
+    """A picture of the window."""
+    editor.settle()
+    editor.page.wait_for_timeout(400)
+    editor.page.screenshot(path=HERE / f"{name}.jpg", type="jpeg", quality=80)
+
+
+if __name__ == "__main__":
+    main()
