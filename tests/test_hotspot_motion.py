@@ -12,7 +12,7 @@ import pytest
 from cagefield import Cage, Edit, EditStack, Hotspot, Scene
 from cagefield.cameras.camera import Camera
 from cagefield.errors import EditError
-from cagefield.pages.scene_page import _hotspots
+from cagefield.pages.page_hotspots import hotspot_entries
 from cagefield.scene.hotspot_motion import following, shown_hotspots, visible_hotspots
 from cagefield.scene.hotspots import view_of_camera
 from cagefield.server.editor.edit_texts import ReadEdits
@@ -83,7 +83,7 @@ def test_scenes_pages_and_tours_show_them_where_they_are_carried(tmp_path: Path)
     assert opened.hotspots == (SPOT, gone)
     shown = visible_hotspots(opened)
     assert [hotspot.title for hotspot in shown] == ["spot"]
-    (entry,) = _hotspots(opened, shown)
+    (entry,) = hotspot_entries(opened, ())
     assert entry["position"] == pytest.approx([0.1, 0.0, 0.3])
     assert np.array(entry["view"]["c2w"]).reshape(4, 4)[2, 3] == pytest.approx(1.3)
 

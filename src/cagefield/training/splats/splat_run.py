@@ -153,7 +153,8 @@ class SplatRun:
     @property
     def done(self) -> float:
         """Progress of the training, to 1; from 0, or from where a refinement begins."""
-        return 1.0 - (1.0 - self._start_progress) * (1.0 - self._share)
+        share = self._share
+        return 1.0 if share >= 1.0 else self._start_progress + (1.0 - self._start_progress) * share
 
     @property
     def _share(self) -> float:
