@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from cagefield.warps.kernels.lattice_flow import _inverse, sample_velocity
+from cagefield.warps.kernels.lattice_flow import _inverse, sample_velocity, solve_midpoint
 
 MOST_SPREAD = 1.0
 """Bound of an error of a slope from which nothing is proven."""
@@ -111,29 +111,6 @@ def norm(A, rows, columns):
 
 
 @njit(error_model="numpy")
-def _midpoint(grid, half, z, m, work):
-    """Writes the m [3] with m - half v(m) = z by Newton's method; work [11,3]."""
-    v, G, A, B = work[0], work[2:5], work[5:8], work[8:11]
-    for i in range(3):
-        m[i] = z[i]
-    for _ in range(12):
-        sample_velocity(grid, m, v, G)
-        for i in range(3):
-            for j in range(3):
-                A[i, j] = -half * G[i, j]
-            A[i, i] += 1.0
-        _inverse(A, B)
-        size = 0.0
-        r0, r1, r2 = m[0] - half * v[0] - z[0], m[1] - half * v[1] - z[1], m[2] - half * v[2] - z[2]
-        for i in range(3):
-            d = B[i, 0] * r0 + B[i, 1] * r1 + B[i, 2] * r2
-            m[i] = min(max(m[i] - d, -1.0), 1.0)
-            size = max(size, abs(d))
-        if size <= 1e-12:
-            break
-
-
-@njit(error_model="numpy")
 def flow_bound(grids, steps, z, K, spread, a0, a1, work):
     """Takes z [3] and K [3,2] = dz/dp back through the flow, in place: (bound of |dz/dp - K|, found).
 
@@ -146,7 +123,7 @@ def flow_bound(grids, steps, z, K, spread, a0, a1, work):
     for k in range(len(grids)):
         at = len(grids) - 1 - k
         grid, half = grids[at], -0.5 * steps[at]
-        _midpoint(grid, half, z, m, newton)
+        solve_midpoint(grid, half, 1e-12, z, m, newton)
         sample_velocity(grid, m, newton[0], newton[2:5])
         for i in range(3):
             for j in range(3):

@@ -102,30 +102,36 @@ def _inverse(A, out):
 
 
 @njit(**FAST)
+def solve_midpoint(grid, half, enough, z, m, work):
+    """Writes the m [3] with m - half v(m) = z by Newton's method; work [11,3] keeps (1 - half dv/dm)^-1 in 8:11."""
+    v, G, A, B = work[0], work[2:5], work[5:8], work[8:11]
+    for i in range(3):
+        m[i] = z[i]
+    for _ in range(12):
+        sample_velocity(grid, m, v, G)
+        for i in range(3):
+            for j in range(3):
+                A[i, j] = -half * G[i, j]
+            A[i, i] += 1.0
+        _inverse(A, B)
+        size = 0.0
+        r0, r1, r2 = m[0] - half * v[0] - z[0], m[1] - half * v[1] - z[1], m[2] - half * v[2] - z[2]
+        for i in range(3):
+            d = B[i, 0] * r0 + B[i, 1] * r1 + B[i, 2] * r2
+            m[i] = min(max(m[i] - d, -1.0), 1.0)
+            size = max(size, abs(d))
+        if size <= enough:
+            break
+
+
+@njit(**FAST)
 def flow_point(grids, steps, backwards, enough, z, J, slopes, work):
     """Takes a point z [3] through all slices, and with `slopes` its Jacobian J [3,3], in place."""
-    v, m, G, A, B = work[0], work[1], work[2:5], work[5:8], work[8:11]
+    m, B = work[1], work[8:11]
     for k in range(len(grids)):
         at = len(grids) - 1 - k if backwards else k
         half = -0.5 * steps[at] if backwards else 0.5 * steps[at]
-        grid = grids[at]
-        for i in range(3):
-            m[i] = z[i]
-        for _ in range(12):
-            sample_velocity(grid, m, v, G)
-            for i in range(3):
-                for j in range(3):
-                    A[i, j] = -half * G[i, j]
-                A[i, i] += 1.0
-            _inverse(A, B)
-            size = 0.0
-            r0, r1, r2 = m[0] - half * v[0] - z[0], m[1] - half * v[1] - z[1], m[2] - half * v[2] - z[2]
-            for i in range(3):
-                d = B[i, 0] * r0 + B[i, 1] * r1 + B[i, 2] * r2
-                m[i] = min(max(m[i] - d, -1.0), 1.0)
-                size = max(size, abs(d))
-            if size <= enough:
-                break
+        solve_midpoint(grids[at], half, enough, z, m, work)
         for i in range(3):
             z[i] = 2.0 * m[i] - z[i]
         if slopes:
