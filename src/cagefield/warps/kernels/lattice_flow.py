@@ -103,7 +103,7 @@ def _inverse(A, out):
 
 @njit(**FAST)
 def solve_midpoint(grid, half, enough, z, m, work):
-    """Writes the m [3] with m - half v(m) = z by Newton's method; work [11,3] keeps (1 - half dv/dm)^-1 in 8:11."""
+    """Writes the m [3] with m - half v(m) = z by Newton's method; work[8:11] keeps (1 - half dv/dm)^-1."""
     v, G, A, B = work[0], work[2:5], work[5:8], work[8:11]
     for i in range(3):
         m[i] = z[i]
