@@ -108,7 +108,7 @@ def test_failed_write_leaves_the_old_scene(tmp_path: Path, monkeypatch: pytest.M
     def disk_full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("cagefield.scene.scene.dump_edits", disk_full)
+    monkeypatch.setattr("cagefield.scene.scene_values.dump_edits", disk_full)
     with pytest.raises(OSError, match="No space left"):
         ball_scene().save(path, overwrite=True)
     assert files_of(path) == before

@@ -27,6 +27,9 @@ Float32Array = npt.NDArray[np.float32]
 _MAX_BLIND_SHARE = (
     0.1  # above this share of pixels without a ray, coefficients and image do not belong together
 )
+FRONT_FOV_X = math.radians(45.0)
+"""Horizontal field of view of `front_camera`."""
+
 _OPENGL_TO_OPENCV = np.array([1.0, -1.0, -1.0])  # OpenGL camera axes <-> OpenCV camera axes
 
 
@@ -342,6 +345,14 @@ def turntable(
         )
         for a in azimuths
     )
+
+
+def front_camera(bounds: npt.ArrayLike, up: npt.ArrayLike) -> Camera:
+    """A pinhole camera of 400x400 pixels that sees the box `bounds` [2,3] whole, from a little above."""
+    low, high = np.asarray(bounds, np.float64)
+    radius = 0.6 * float(np.linalg.norm(high - low)) / math.sin(0.5 * FRONT_FOV_X)
+    middle = 0.5 * (low + high)
+    return turntable(middle, radius, 1, elevation=0.3, up=up, width=400, height=400, fov_x=FRONT_FOV_X)[0]
 
 
 def _unproject_pixels(

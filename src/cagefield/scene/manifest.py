@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cagefield.errors import CagefieldError, SceneError
+from cagefield.files.atomic import replaced_file
+from cagefield.files.stale_files import remove_leftovers
 from cagefield.images.render_result import background_rgb
 from cagefield.scene.alignment import Alignment
 from cagefield.scene.hotspots import Hotspot, hotspots_from_value
-from cagefield.scene.scene_files import FORMAT, MANIFEST, VERSION, check_part, read_json
+from cagefield.scene.scene_files import FORMAT, MANIFEST, VERSION, check_part, read_json, write_json
 from cagefield.typing import Array
 
 MAX_CONDITION = 1e9
@@ -85,6 +88,15 @@ def manifest_document(manifest: Manifest) -> Mapping[str, object]:
     if manifest.hotspots:
         document["hotspots"] = [hotspot.to_dict() for hotspot in manifest.hotspots]
     return document
+
+
+@contextmanager
+def manifest_draft(folder: Path, manifest: Manifest) -> Iterator[None]:
+    """The manifest is written when the context begins and takes its place in the folder when it ends."""
+    remove_leftovers(folder / MANIFEST)
+    with replaced_file(folder / MANIFEST, parents=False) as draft:
+        write_json(manifest_document(manifest), draft)
+        yield
 
 
 def checked_gains(values: Any, count: int) -> tuple[tuple[float, float, float], ...]:

@@ -21,11 +21,9 @@ a half of each.
 from __future__ import annotations
 
 import dataclasses
-import math
 import os
-import warnings
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from functools import cache, cached_property, partial
 from pathlib import Path
 from types import MappingProxyType
@@ -34,52 +32,28 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cagefield.cameras.camera import Camera, turntable
+from cagefield.cameras.camera import Camera, front_camera
 from cagefield.completion.pasting.paste_content import content_box
 from cagefield.compute.cancellation import check_cancelled
 from cagefield.edits import EditStack, LatticeError, Paste, PreparedStack
-from cagefield.edits.edit_files import dump_edits, load_edits
 from cagefield.edits.paste_paths import rebased
 from cagefield.edits.paste_placement import placed_paste
-from cagefield.errors import CagefieldError, SceneError
+from cagefield.errors import SceneError
 from cagefield.fields.external.external_field import ExternalField
-from cagefield.fields.frusta import in_frusta
 from cagefield.fields.nerf_field import NerfField
 from cagefield.fields.splat_field import NO_OFFSET, Offset, SplatField
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.files.atomic import replaced_file, replaced_folder
+from cagefield.files.atomic import replaced_folder
 from cagefield.files.safe_open import real_path
-from cagefield.files.stale_files import remove_leftovers
 from cagefield.images.render_result import Background, RenderResult, background_rgb
 from cagefield.scene.alignment import Alignment
+from cagefield.scene.baked_voxels import bake_original
 from cagefield.scene.hotspots import Hotspot, check_count
-from cagefield.scene.manifest import (
-    Manifest,
-    checked_affine,
-    checked_gains,
-    manifest_document,
-    read_manifest,
-)
+from cagefield.scene.manifest import Manifest, checked_affine, checked_gains, manifest_draft
 from cagefield.scene.paste_sources import SceneSources, position_beside, up_of_cameras
-from cagefield.scene.removed_elements import Removal, dump_removed, read_removed, without_removed
-from cagefield.scene.scene_files import (
-    CAMERAS,
-    EDITS,
-    FIELD,
-    FILES,
-    MANIFEST,
-    ORIGINAL,
-    REMOVED,
-    VERSION,
-    check_destination,
-    check_part,
-    read_cameras,
-    read_field,
-    read_original,
-    recover,
-    save_original,
-    write_json,
-)
+from cagefield.scene.removed_elements import Removal
+from cagefield.scene.scene_files import FILES, MANIFEST, VERSION, check_destination
+from cagefield.scene.scene_values import read_scene, write_scene
 from cagefield.typing import Array
 
 if TYPE_CHECKING:
@@ -96,10 +70,6 @@ if TYPE_CHECKING:
 
         @property
         def gains(self) -> NDArray[np.float32] | None: ...
-
-
-FRONT_FOV_X = math.radians(45.0)
-"""Horizontal field of view of the camera in front of a scene without cameras."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -193,29 +163,7 @@ class Scene:
             FieldError: options outside their range, a field that is empty.
             SceneError: a field of another class.
         """
-        if not isinstance(original, NerfField | ExternalField | SplatField):
-            raise SceneError(
-                "the original must be a NerfField, an ExternalField or a SplatField, got "
-                f"{type(original).__name__}; of another field make Scene(bake(field))"
-            )
-        from cagefield.fields.baking import bake
-
-        if isinstance(original, SplatField) and any(original.offset):
-            warnings.warn(
-                f"voxels keep no offset: {list(original.offset)} is to be added to their coordinates",
-                stacklevel=2,
-            )
-        every = [camera for group in cameras.values() for camera in group]
-        near = 0.0 if isinstance(original, SplatField) or getattr(original, "ndc", None) else original.near
-        voxels = bake(
-            original,
-            resolution,
-            sh_degree=sh_degree,
-            eyes=np.array([camera.origin for camera in every]) if every else None,
-            contracted=unbounded,
-            visible=partial(in_frusta, every, near=near) if unbounded and every else None,
-            on_progress=on_progress,
-        )
+        voxels = bake_original(original, cameras, resolution, sh_degree, unbounded, on_progress)
         kept = None if isinstance(original, SplatField) else original
         return cls(voxels, cameras=cameras, background=background, original=kept)
 
@@ -230,39 +178,9 @@ class Scene:
                 names the file and the cure.
         """
         folder = Path(path)
-        recover(folder)
-        if not folder.is_dir():
-            what = "is a file, not a folder" if folder.exists() else "does not exist"
-            raise SceneError(f"scene {folder} {what}; give the folder that `cagefield train -o` wrote")
-        manifest = read_manifest(folder)
-        for name in (FIELD, CAMERAS, EDITS):
-            check_part(folder / name)
-        cameras = read_cameras(folder / CAMERAS)
-        edits = load_edits(folder / EDITS, check=False, mend=True)
-        field, removed = read_field(folder / FIELD), None if whole else read_removed(folder)
-        removal = None
-        if removed is not None:
-            try:
-                removal, field = Removal(field, removed), without_removed(field, removed)
-            except CagefieldError as error:
-                cure = "remove the file to restore all elements"
-                raise SceneError(f"{folder / REMOVED}: {error!s:.200}; {cure}") from None
-        original = read_original(folder / ORIGINAL) if (folder / ORIGINAL).exists() else None
+        values = read_scene(folder, whole)
         try:
-            return cls(
-                field,
-                edits,
-                cameras,
-                manifest.background,
-                gains=manifest.gains,
-                original=original,
-                preserve_opacity=manifest.preserve_opacity,
-                folder=folder.absolute(),
-                source_to_world=np.eye(4) if manifest.source_to_world is None else manifest.source_to_world,
-                removal=removal,
-                alignment=manifest.alignment,
-                hotspots=manifest.hotspots,
-            )
+            return cls(**values, folder=folder.absolute())
         except SceneError as error:
             raise SceneError(f"{folder / MANIFEST}: {error}") from None
 
@@ -287,17 +205,8 @@ class Scene:
             for name, text in beside.items():
                 if text is not None:
                     (draft / name).write_text(text, encoding="utf-8")
-            (self.field if self.removal is None else self.removal.field).save(draft / FIELD)
-            if self.removal is not None:
-                (draft / REMOVED).write_text(dump_removed(self.removal.selection), encoding="utf-8")
-            if self.original is not None:
-                save_original(self.original, draft / ORIGINAL)
             edits = EditStack(rebased(self.edits, self.folder, target))
-            (draft / EDITS).write_text(dump_edits(edits), encoding="utf-8")
-            write_json(
-                {split: [camera.to_dict() for camera in members] for split, members in self.cameras.items()},
-                draft / CAMERAS,
-            )
+            write_scene(draft, self.field, self.removal, self.original, edits, self.cameras)
             self.save_manifest(draft)
 
     def save_manifest(self, folder: Path) -> None:
@@ -305,21 +214,10 @@ class Scene:
         with self.draft_manifest(folder):
             pass
 
-    @contextmanager
-    def draft_manifest(self, folder: Path) -> Iterator[None]:
+    def draft_manifest(self, folder: Path) -> AbstractContextManager[None]:
         """The manifest is written when the context begins and takes its place in the folder when it ends."""
-        manifest = Manifest(
-            self.background,
-            self.gains,
-            self.preserve_opacity,
-            self.source_to_world,
-            self.alignment,
-            self.hotspots,
-        )
-        remove_leftovers(folder / MANIFEST)
-        with replaced_file(folder / MANIFEST, parents=False) as draft:
-            write_json(manifest_document(manifest), draft)
-            yield
+        values = self.background, self.gains, self.preserve_opacity
+        return manifest_draft(folder, Manifest(*values, self.source_to_world, self.alignment, self.hotspots))
 
     def with_edits(self, edits: EditStack) -> Scene:
         """Scene with another edit stack.
@@ -349,9 +247,8 @@ class Scene:
 
         Put it into a stack: `scene.with_edits(scene.edits.append(scene.paste("../chair")))`, and move, turn
         and scale it as any other edit. `at` [3] is the position of the middle of its base, by default beside
-        this
-        scene's content; `size` is its longest edge, in this scene's units, as large as it is
-        there where it is left out. A relative path is relative to the scene's folder.
+        this scene's content; `size` is its longest edge, in this scene's units, as large as it is there where
+        it is left out. A relative path is relative to the scene's folder.
 
         Raises:
             CagefieldError: there is no such scene, or its field is of another kind than this one's.
@@ -419,7 +316,8 @@ class Scene:
             return original_renderer(self.original, exact, self.preserve_opacity)
         if isinstance(self.field, SplatField):
             return self._exact_splats
-        return sampled_renderer(self.field, self._exact_edits, self.preserve_opacity, camera)
+        exact = self.prepared_edits.without_lattices()
+        return sampled_renderer(self.field, exact, self.preserve_opacity, camera)
 
     @cached_property
     def rendered_field(self) -> VoxelField | SplatSet:
@@ -477,12 +375,7 @@ class Scene:
         for split in ("test", "val", "train"):
             if self.cameras.get(split):
                 return self.cameras[split][0]
-        low, high = self.field.bounds
-        radius = 0.6 * float(np.linalg.norm(high - low)) / math.sin(0.5 * FRONT_FOV_X)
-        middle = 0.5 * (low + high)
-        return turntable(
-            middle, radius, 1, elevation=0.3, up=self.up, width=400, height=400, fov_x=FRONT_FOV_X
-        )[0]
+        return front_camera(self.field.bounds, self.up)
 
     @cached_property
     def sources(self) -> SceneSources:
@@ -491,11 +384,8 @@ class Scene:
 
     @cached_property
     def _exact_splats(self) -> InteractiveRenderer:
-        return self.renderer.with_edits(self._exact_edits, preserve_opacity=self.preserve_opacity)
-
-    @property
-    def _exact_edits(self) -> PreparedStack:
-        return self.prepared_edits.without_lattices()
+        edits = self.prepared_edits.without_lattices()
+        return self.renderer.with_edits(edits, preserve_opacity=self.preserve_opacity)
 
 
 def _open_pasted(folder: Path, pasting: tuple[Path, ...]) -> Scene:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
 import numpy as np
 
-from cagefield.edits import Continuous, EditStack, Paste, dump_edits
+from cagefield.edits import Paste
 from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage
 from cagefield.server.editor.cage_placement import fit_to_content
@@ -29,25 +28,20 @@ from cagefield.server.protocol.conversion import (
     dragged_of,
     keys_of,
     operation_of,
-    stills_of,
-    view_height,
 )
 from cagefield.server.render_queue.coordinator import Coordinator, Page
 from cagefield.server.render_worker.tasks import (
-    EditValues,
     FitTask,
-    GridTask,
     LookTask,
     Shown,
-    SurfaceTask,
     values_of,
 )
 from cagefield.server.render_worker.view import Display
+from cagefield.server.web.answers import answer_of, seen_point
 from cagefield.server.web.hotspot_handlers import change_hotspots
 from cagefield.server.web.point_handlers import PointChange, change_points
-from cagefield.server.web.selection_handlers import change_selection, histogram_of
+from cagefield.server.web.selection_handlers import change_selection
 from cagefield.server.web.worker_threads import run_in_thread
-from cagefield.typing import Array
 
 Handler = Callable[[Any, Any], "Coroutine[Any, Any, None] | None"]
 Method = TypeVar("Method", bound=Handler)
@@ -124,53 +118,11 @@ class MessageHandlers:
     @_handles(client_messages.Ask)
     async def _ask(self, message: client_messages.Ask) -> None:
         try:
-            answer = await self._answer(message)
+            answer = await answer_of(self._coordinator, self._page, message)
         except Exception:
             self._page.send_queue.put(server_messages.Answer(request=message.request, failed=True))
             raise
         self._page.send_queue.put(answer)
-
-    async def _answer(self, message: client_messages.Ask) -> server_messages.Answer:
-        if message.what == "edit_text":
-            if message.edit is None:
-                raise CagefieldError("choose an edit to copy")
-            edit = self._session.document.entry(message.edit).edit
-            text = dump_edits(self._coordinator.store.written(EditStack([edit])))
-            return server_messages.Answer(request=message.request, text=text)
-        if message.what == "sources":
-            sources = await asyncio.to_thread(self._coordinator.store.sources)
-            return server_messages.Answer(request=message.request, sources=sources)
-        if message.what == "grid":
-            return server_messages.Answer(request=message.request, grid=await self._grid(message.edit))
-        if message.what == "histogram":
-            counts = await histogram_of(self._coordinator, message.attribute)
-            return server_messages.Answer(request=message.request, histogram=counts)
-        if message.what == "path":
-            document = self._session.document
-            return server_messages.Answer(
-                request=message.request, stills=stills_of(document.keys, document.loop)
-            )
-        found = await self._surface(message.x, message.y)
-        if found is None:
-            return server_messages.Answer(request=message.request)
-        return server_messages.Answer(request=message.request, point=tuple(found[0]), normal=tuple(found[1]))
-
-    async def _grid(self, number: int | None) -> Any:
-        if number is None:
-            raise CagefieldError("choose an edit to show the grid of")
-        edit = self._session.shown.entry(number).edit
-        if not isinstance(edit, Continuous) or self._session.problem(edit) is not None:
-            return []
-        values, removed = EditValues.from_edit(edit), self._session.shown.removed
-        below = Shown(values_of(self._session.below(number)), removed=removed)
-        return await self._coordinator.ask(lambda task: GridTask(task, values, below))
-
-    async def _surface(self, x: float, y: float) -> Any:
-        camera = self._page.camera
-        if camera is None:
-            raise CagefieldError("the page has sent no camera yet; try again")
-        shown = self._coordinator.shown()
-        return await self._coordinator.ask(lambda number: SurfaceTask(number, shown, camera, x, y))
 
     # ---- drags ----
 
@@ -247,13 +199,13 @@ class MessageHandlers:
 
     @_handles(client_messages.Place)
     async def _place(self, message: client_messages.Place) -> None:
-        point, height = await self._seen(message.x, message.y)
+        point, height = await seen_point(self._coordinator, self._page, message.x, message.y)
         self._session.place(point, height)
         self._coordinator.changed()
 
     @_handles(point_messages.PlacePoint)
     async def _place_point(self, message: point_messages.PlacePoint) -> None:
-        point, height = await self._seen(message.x, message.y)
+        point, height = await seen_point(self._coordinator, self._page, message.x, message.y)
         self._session.place_point(point, height)
         self._coordinator.changed()
 
@@ -264,26 +216,11 @@ class MessageHandlers:
         await change_points(self._session, self._page, message)
         self._coordinator.changed()
 
-    async def _seen(self, x: float | None, y: float | None) -> tuple[Array, float]:
-        """The point [3] of the surface at a pixel, and the view frustum's height there, world units.
-
-        Without a pixel it is in the middle of the view, or of the field where no surface is seen there.
-        """
-        camera = self._page.camera
-        if camera is None:
-            raise CagefieldError("the page has sent no camera yet; try again")
-        anywhere = x is None or y is None
-        found = await self._surface(0.5 if x is None else x, 0.5 if y is None else y)
-        if found is None and not anywhere:
-            raise CagefieldError("there is no surface under the mouse; double-click on the object")
-        point = np.array(found[0]) if found is not None else self._session.bounds.mean(axis=0)
-        return point, view_height(camera, float(np.linalg.norm(point - camera.origin)))
-
     @_handles(client_messages.PasteScene)
     async def _paste_scene(self, message: client_messages.PasteScene) -> None:
         path = self._coordinator.store.source_of(message.source)
         box, up, own_up = await self._coordinator.ask(lambda number: LookTask(number, str(path)))
-        point, height = await self._seen(None, None)
+        point, height = await seen_point(self._coordinator, self._page, None, None)
         edit = build_paste(
             str(path), path.stem[:100], np.array(box), np.array(up), point, np.array(own_up), height
         )
