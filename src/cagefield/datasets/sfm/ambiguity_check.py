@@ -92,7 +92,8 @@ def check_ambiguity(dataset: Dataset, on_progress: OnProgress | None = None) -> 
     if len(contradicting_photos) < max(MIN_FOLDED_PHOTOS, len(views) / MIN_FOLDED_SHARE_INVERSE):
         return None
     worst = [k for k, (i, j) in enumerate(pairs) if i in contradicting_photos and j in contradicting_photos]
-    i, j = pairs[min(worst, key=lambda k: np.nan_to_num(likenesses[k], nan=1.0))]
+    known: FloatArray = np.nan_to_num(likenesses[worst], nan=1.0)
+    i, j = pairs[worst[int(known.argmin())]]
     return Fold(len(contradicting_photos), len(views), (views[i].name, views[j].name))
 
 
