@@ -62,6 +62,7 @@ def test_everything_that_absorbs_is_stored_and_little_else() -> None:
     np.testing.assert_allclose(baked(points, directions(len(points)))[0], 20.0, rtol=1e-5)
 
 
+@pytest.mark.nightly
 def test_parts_smaller_than_the_first_pass_are_found() -> None:
     ball = UniformSphere((0, 0, 0), 0.5, 20.0, (0.9, 0.1, 0.1))
     # one voxel's edge is 2/127: a ball of that radius lies between the vertices of the first pass

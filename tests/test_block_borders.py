@@ -15,6 +15,7 @@ from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats.splat_files import read_splats
 from cagefield.training.splats.blocks import Block, merge, partition
 from splat_scenes import ball_of_splats, splat_scene
+from tiers import nightly_after_first
 
 INNER = Cage.box((0.05, 0.1, 0.0), (0.6, 0.7, 1.2))
 EDITS = {
@@ -68,7 +69,7 @@ def test_pictures_of_an_edit_across_borders(scenes: tuple[Scene, Scene], name: s
     np.testing.assert_allclose(merged.opacity, one.opacity, atol=1e-5)
 
 
-@pytest.mark.parametrize("name", EDITS)
+@pytest.mark.parametrize("name", nightly_after_first(EDITS))
 def test_exports_of_an_edit_across_borders(scenes: tuple[Scene, Scene], tmp_path: Path, name: str) -> None:
     """Splats of the edited scenes, and of their files, as sets."""
     edited = [scene.with_edits(EditStack([EDITS[name]])) for scene in scenes]

@@ -195,6 +195,7 @@ def test_photos_that_are_in_no_split_are_counted(short_room, tmp_path):
     assert captures.left_out_photos(data) == 2
 
 
+@pytest.mark.nightly
 def test_figures_leave_out_what_a_mask_excludes(short_room, tmp_path):
     """A square of each test photo is painted black and masked: figures are those of the other pixels."""
     data = load_dataset(short_room)

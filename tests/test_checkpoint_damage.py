@@ -149,6 +149,7 @@ def test_texts_whose_letters_are_none_are_refused(tmp_path: Path) -> None:
             read_checkpoint(tmp_path / "x.npz", "mine")
 
 
+@pytest.mark.nightly
 def test_the_sums_of_other_networks_are_refused(photos: Dataset, tmp_path: Path) -> None:
     torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
     from cagefield.training.nerf.nerf_config import NerfConfig

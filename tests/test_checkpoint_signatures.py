@@ -47,6 +47,7 @@ def views_and_sizes(photos: Dataset) -> str:
     return json.dumps([[view.name for view in photos.train], [[24, 24]] * len(photos.train)])[1:]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", ["voxels", "splats"])
 def test_a_checkpoint_of_earlier_option_names_is_continued(
     kind: str, photos: Dataset, tmp_path: Path

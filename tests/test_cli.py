@@ -367,6 +367,7 @@ def test_make_scene_refuses_unknown_names_and_other_folders(
     assert files_of(tmp_path) == {"holidays/beach.jpg": b"sea"}
 
 
+@pytest.mark.nightly
 def test_make_scene_writes_captures_of_rooms(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     out = tmp_path / "photos"
     argv = ["make-scene", "room-chair", "-o", out, "--views", 9, "--size", 32]

@@ -38,6 +38,7 @@ from cagefield.server.render_worker.edited_splats import EditedSplats, write_edi
 from commands import printed, refused
 from scenes import ball_field, ball_scene
 from splat_scenes import assert_same_splats, ball_of_splats, random_splats, splat_scene
+from tiers import nightly_after_first
 
 INNER = Cage.box((0, 0, 0), 1.3)
 MOVED = Edit.move(INNER, name="ball").translate((0.25, 0, 0))
@@ -257,7 +258,7 @@ def test_an_edited_field_is_the_field_where_it_was_taken_from() -> None:
     assert (sigma[left & ~held] == 0).all() and (sigma[held] > 0).any()
 
 
-@pytest.mark.parametrize("kind", ["voxels", "splats"])
+@pytest.mark.parametrize("kind", nightly_after_first(["voxels", "splats"]))
 def test_meshes_have_the_edits_in_them(capsys: pytest.CaptureFixture[str], tmp_path: Path, kind: str) -> None:
     pytest.importorskip("skimage", reason="needs scikit-image")
     scene = ball_scene() if kind == "voxels" else splat_scene()

@@ -116,6 +116,7 @@ def test_interrupted_training_is_saved_and_resumed(
     np.testing.assert_array_equal(Scene.open(whole).field.density, resumed.density)
 
 
+@pytest.mark.nightly
 def test_demo_runs_the_whole_chain(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

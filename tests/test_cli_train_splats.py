@@ -108,6 +108,7 @@ def test_interrupted_training_is_saved_and_resumed(
     assert_same_splats(resumed, whole)
 
 
+@pytest.mark.nightly
 def test_voxels_of_a_capture_say_what_they_are_not_good_at(
     capture: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

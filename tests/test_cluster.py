@@ -117,6 +117,7 @@ def test_kept_frames_stay_and_the_others_are_added(
     assert "5 of them kept" in printed(capsys, "render", scene, "-o", out, *options, "--keep")
 
 
+@pytest.mark.nightly
 def test_a_video_from_kept_frames_is_the_video(scene: Path, tmp_path: Path) -> None:
     options = ["--turntable", 4, "--size", "32x24", "--normals", "--depth"]
     run("render", scene, "-o", tmp_path / "one.mp4", *options)

@@ -97,6 +97,7 @@ def test_blocks_of_a_cluster_are_those_of_one_process(
     assert not (tmp_path / "many.blocks").exists()
 
 
+@pytest.mark.nightly
 @pytest.mark.train
 def test_a_cluster_goes_on_with_the_blocks_of_an_interrupted_training(
     street: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -137,6 +137,7 @@ def test_units_make_no_difference(scenes: tuple[Scene, Scene]) -> None:
     assert db(seen(large.with_edits(EditStack([Edit.delete(cage(50.0))]))), small) > 40.0
 
 
+@pytest.mark.nightly
 def test_the_fit_finds_the_shade_and_none_where_none_is(scenes: tuple[Scene, Scene]) -> None:
     scene, _ = scenes
     ambience = scene.patcher.light_model
@@ -177,6 +178,7 @@ def test_switched_off_nothing_is_patched(scenes: tuple[Scene, Scene]) -> None:
     assert not needs_patch(continuous) and not needs_patch(Edit.delete(cage()).replace(enabled=False))
 
 
+@pytest.mark.nightly
 def test_patches_are_kept_while_a_cage_is_dragged(scenes: tuple[Scene, Scene]) -> None:
     scene, _ = scenes
     edit = Edit.move(cage()).translate((-0.5, 0.0, 0.0))
@@ -283,6 +285,7 @@ def test_membranes_are_harmonic() -> None:
     np.testing.assert_allclose(solve_membrane(hole, ~hole, table), values, atol=1e-2)
 
 
+@pytest.mark.nightly
 def test_a_table_ends_at_its_edge(scenes: tuple[Scene, Scene]) -> None:
     """A box that stands over a floor's edge leaves no floor in the air."""
     field = room(True)
@@ -345,6 +348,7 @@ def test_openness_needs_weights() -> None:
     np.testing.assert_allclose(np.exp(both.log_openness(np.array([[0.0, 0.0], [1.0, 0.0]]))), [1.0, 0.5])
 
 
+@pytest.mark.nightly
 def test_a_clone_fills_with_what_another_cage_holds(scenes: tuple[Scene, Scene]) -> None:
     """A hole through the floor shows the floor beside it, without a seam; the file says so."""
     scene, truth = scenes

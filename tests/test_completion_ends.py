@@ -25,6 +25,7 @@ from solid_fields import solid_field
 from test_completion import cage, cameras, room
 from test_continuous_relighting import INNER, LIGHT, OUTER
 from test_continuous_relighting import room as gap_room
+from tiers import nightly_after_first
 
 
 def handle(held: bool) -> VoxelField:
@@ -39,7 +40,7 @@ def handle(held: bool) -> VoxelField:
     return solid_field((box & ~within) | rod, rgb)
 
 
-@pytest.mark.parametrize("keep_source", [True, False])
+@pytest.mark.parametrize("keep_source", nightly_after_first([True, False]))
 def test_the_face_of_a_part_goes_on_where_it_was_held(keep_source: bool) -> None:
     inner = Cage.box((-0.4, 0.0, -0.3), (0.72, 0.72, 0.48))
     edit = (Edit.copy if keep_source else Edit.move)(inner, relight="none")

@@ -213,6 +213,7 @@ def test_splats_under_what_is_lifted_get_lighter():
     assert log[under].mean() > 0.15 and np.abs(log[far]).max() < 0.05
 
 
+@pytest.mark.nightly
 def test_light_that_arrives_leaves_the_splits_of_geometry(monkeypatch: pytest.MonkeyPatch) -> None:
     """The result is the same where both come at once; splats on an edge of the shadow are split by it too."""
     field = splat_room(True)

@@ -67,6 +67,7 @@ def test_colors_are_those_of_the_photos_at_the_points(data, points):
     assert inside.mean() > 0.95 and np.median(off) < 12  # of 255; features sit on edges
 
 
+@pytest.mark.nightly
 def test_training_views_alone_make_the_points_of_a_training(data, points, tmp_path):
     tested = {view.name for view in data.test}
     trained = {view.name for view in data.train}
@@ -238,6 +239,7 @@ def test_a_data_set_s_own_points_are_used_without_those_of_held_out_photos(data)
     assert training_points(data) is None
 
 
+@pytest.mark.nightly
 def test_photos_without_texture_give_none_with_one_warning(tmp_path):
     textured_capture(tmp_path, 4)
     for photo in tmp_path.glob("*/*.png"):

@@ -79,6 +79,7 @@ def test_where_light_comes_from_is_found_in_pictures(lit: Scene) -> None:
     assert 0.5 < np.linalg.norm(found) / np.linalg.norm(TOWARDS) < 1.1
 
 
+@pytest.mark.nightly
 def test_where_all_sides_are_alike_none_is_found() -> None:
     dull = Scene(balls(np.zeros(3)), cameras={"train": cameras()})
     facing = dull.patcher.light_model.diffuse

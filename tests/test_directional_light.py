@@ -91,6 +91,7 @@ def test_the_sun_is_found_in_pictures(lit: Scene) -> None:
     assert np.dot(sun.direction, SUN) > np.cos(np.radians(20.0)) and abs(sun.share - SHARE) < 0.25
 
 
+@pytest.mark.nightly
 def test_no_sun_is_found_where_none_shines() -> None:
     dull = scene(room(AT, sun=0.0))
     assert dull.patcher._model_for(moved("shadow")[0]).directional is None

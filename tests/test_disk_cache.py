@@ -126,6 +126,7 @@ def test_a_drag_before_anything_is_known_is_made_again_when_it_ends() -> None:
     assert patcher.prepare(edit, stage=PatchStage.INPAINTED).edits[0].patch is settled
 
 
+@pytest.mark.nightly
 def test_splats_have_the_same_patches_again() -> None:
     """Every class that a patch of splats and its light are made of is kept."""
     field = splat_room(True)

@@ -197,6 +197,7 @@ def test_set_mode_places_fits_and_moves_cages(editor: EditorPage) -> None:
     np.testing.assert_allclose(np.abs(inner), BALL_RADIUS, atol=0.05)
 
 
+@pytest.mark.nightly
 def test_kinds_numbers_and_patches_are_set_in_the_panel(editor: EditorPage) -> None:
     start, pivot = editor.edit["deformed"], editor.edit["pivot"]
     editor.fill("Position", pivot[2] + 0.1, "z")
@@ -223,6 +224,7 @@ def test_kinds_numbers_and_patches_are_set_in_the_panel(editor: EditorPage) -> N
     assert editor.edit["fill"] == "none"
 
 
+@pytest.mark.nightly
 def test_the_list_hides_locks_renames_duplicates_and_orders(editor: EditorPage) -> None:
     page, first = editor.page, editor.edit["id"]
     line = f'.edit[data-edit="{first}"]'
@@ -267,6 +269,7 @@ def moves(editor: EditorPage) -> NDArray[np.float64]:
     return np.subtract(points["deformed"], points["canonical"], dtype=np.float64)
 
 
+@pytest.mark.nightly
 def test_lattice_points_are_dragged_alone_and_by_rows(editor: EditorPage, folder: Path) -> None:
     editor.loaded(folder / "lattice.yaml")
     editor.tools(tool="select")
@@ -286,6 +289,7 @@ def test_lattice_points_are_dragged_alone_and_by_rows(editor: EditorPage, folder
     editor.press("Escape")
 
 
+@pytest.mark.nightly
 def test_control_points_take_neighbors_along_and_are_connected(editor: EditorPage, folder: Path) -> None:
     editor.loaded(folder / "points.yaml")
     editor.tools(tool="select")
@@ -317,6 +321,7 @@ def test_a_mesh_file_becomes_a_cage(editor: EditorPage, folder: Path) -> None:
     assert len(editor.edit["points"]["edges"]) == 18
 
 
+@pytest.mark.nightly
 def test_a_child_is_dragged_where_its_parent_carries_it(editor: EditorPage, folder: Path) -> None:
     editor.loaded(folder / "chain.yaml")
     arm, finger = (edit["id"] for edit in editor.state["edits"])
@@ -355,6 +360,7 @@ def selected(editor: EditorPage, action: Any) -> int:
     return 0 if count is None else int(count["count"])
 
 
+@pytest.mark.nightly
 def test_elements_are_selected_isolated_deleted_and_restored(editor: EditorPage) -> None:
     editor.changed(lambda: editor.press("Delete"))
     middle = place(editor, (0, 0, 0))
@@ -390,6 +396,7 @@ def test_elements_are_selected_isolated_deleted_and_restored(editor: EditorPage)
     editor.press("Escape", "Escape")
 
 
+@pytest.mark.nightly
 def test_a_scene_is_pasted(editor: EditorPage) -> None:
     editor.press("Shift+V")
     editor.until("document.querySelector('dialog select[name=source]') !== null")
@@ -399,6 +406,7 @@ def test_a_scene_is_pasted(editor: EditorPage) -> None:
     editor.changed(lambda: editor.press("Delete"))
 
 
+@pytest.mark.nightly
 def test_views_split_and_before(editor: EditorPage) -> None:
     color = shot(editor)
     editor.page.click('.top [data-view="normals"]')
@@ -427,6 +435,7 @@ def test_views_split_and_before(editor: EditorPage) -> None:
     editor.press("Escape")
 
 
+@pytest.mark.nightly
 def test_a_camera_path_is_recorded_and_played(editor: EditorPage) -> None:
     editor.changed(lambda: editor.press("k"))
     with editor.held((80, 370), (60, 0)):
@@ -469,6 +478,7 @@ def test_a_distance_is_measured(editor: EditorPage) -> None:
     editor.press("Escape")
 
 
+@pytest.mark.nightly
 def test_edits_are_saved_downloaded_and_found_again(
     editor: EditorPage, server: EditorServer, folder: Path
 ) -> None:

@@ -25,6 +25,7 @@ def loaded(name: str) -> ModuleType:
     return module
 
 
+@pytest.mark.nightly
 def test_an_own_module_is_edited_exactly_and_baked(tmp_path) -> None:
     from cagefield.fields import Field
     from cagefield.images.image_files import read_image

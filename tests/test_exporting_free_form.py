@@ -22,6 +22,8 @@ from page_fields import SIZE, lumps_scene
 from test_exporting_splats import splats_scene
 from tiers import nightly_after_first
 
+pytestmark = pytest.mark.nightly
+
 FREE_FORM: tuple[Continuous, ...] = (
     Edit.continuous(
         Cage.box((-0.4, 0, 0), (0.7, 0.7, 1.0)).subdivided((1, 1, 3)),

@@ -145,6 +145,7 @@ BARE: Any = {"fill": "none", "relight": "none", "feather": 0.0}
 """Options of edits that have no patch, or one made by hand."""
 
 
+@pytest.mark.nightly
 def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
     scene = lumps_scene()
     gone = Edit.delete(Cage.box((-0.8, 0.0, 0.0), (0.4, 1.8, 1.6))).replace(**BARE)
@@ -270,6 +271,7 @@ def test_a_path_that_moves_no_edit_has_no_states() -> None:
     assert "path" not in ScenePage.build(scene, "lumps", keys).files
 
 
+@pytest.mark.nightly
 def test_parts_of_an_edit_that_are_impossible_are_named() -> None:
     """After a quarter turn the cage is inside again, on the way its corners are not."""
     close = Edit.continuous(TURN.inner, Cage.box((0, 0, 0), (1.0, 1.0, 1.0)), name="spin").rotate(

@@ -78,6 +78,7 @@ def test_the_page_shows_the_edited_splats_and_those_before(tmp_path: Path) -> No
         assert psnr(pixels(page), after) >= 40.0
 
 
+@pytest.mark.nightly
 def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
     gone = Edit.delete(Cage.box((-0.8, 0.0, 0.0), (0.4, 1.8, 1.6)))
     scene = splats_scene(TURN, MOVE, gone)

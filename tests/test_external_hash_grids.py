@@ -56,6 +56,7 @@ def test_moved_content_looks_as_from_a_camera_moved_along(tmp_path: Path, make, 
     assert left.opacity.max() < 1e-3
 
 
+@pytest.mark.nightly
 def test_the_command_bakes_a_nerfacto_with_its_data_sets_cameras(tmp_path: Path, capsys) -> None:
     path = nerfacto_files.write_run(tmp_path, box=True, background="white")
     out = printed(capsys, "import", path, "-o", tmp_path / "scene", "--resolution", 24, "--compare", 0)

@@ -59,6 +59,7 @@ def test_spz_files_that_end_early_are_refused_with_little_memory(
     assert _taken_by_refusal(file, "no SPZ file") < 8 << 20
 
 
+@pytest.mark.nightly
 def test_splats_none_of_which_is_visible_are_refused_with_little_memory(tmp_path: Path) -> None:
     """All of them were read first. A part of what is unpacked is in memory, and a part that is decoded."""
     splats = random_splats(200_000, degree=1)

@@ -29,6 +29,7 @@ from cagefield.geometry.quaternions import rotation_matrices
 from commands import printed, refused
 from splat_damage import SLACK, attack, ksplat_of, sample_files, splatfacto_tensors
 from splat_scenes import assert_same_splats, random_splats
+from tiers import nightly_except
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "splats"
 
@@ -452,7 +453,24 @@ USD_MUTATIONS = 3
 """A suffix of USD, of which each file is read by a process of its own."""
 
 
-@pytest.mark.parametrize("ending", ["-4.spz", "-text.ply", ".ksplat", ".ckpt", *WRITABLE])
+DAMAGED_EVERY_RUN = (
+    "-4.spz",
+    "-text.ply",
+    ".ksplat",
+    ".ply",
+    ".compressed.ply",
+    ".splat",
+    ".sog",
+    ".glb",
+    ".usdc",
+)
+"""Suffixes of formats of every kind; one of USD."""
+
+
+@pytest.mark.parametrize(
+    "ending",
+    nightly_except(["-4.spz", "-text.ply", ".ksplat", ".ckpt", *WRITABLE], *DAMAGED_EVERY_RUN),
+)
 def test_damaged_files_are_read_or_refused_in_a_line(
     tmp_path: Path, ending: str, files: dict[str, bytes]
 ) -> None:

@@ -105,7 +105,7 @@ def test_the_falloff_is_one_inside_zero_outside_and_monotonous() -> None:
         assert np.abs(steps).max() < 0.1
 
 
-@pytest.mark.parametrize("name", nightly_except(STACKS, "grade alone", "turned, lattice", "bent", "two"))
+@pytest.mark.parametrize("name", nightly_except(STACKS, "grade alone", "turned, lattice", "two"))
 def test_the_kernels_grade_is_the_references(name: str) -> None:
     stack = EditStack(STACKS[name])
     rng = np.random.default_rng(2)
@@ -120,7 +120,7 @@ def test_the_kernels_grade_is_the_references(name: str) -> None:
     assert np.quantile(np.abs(kernel.density - exact.density), 0.999) < 2e-3
 
 
-@pytest.mark.parametrize("name", nightly_except(STACKS, "turned, lattice", "bent", "two"))
+@pytest.mark.parametrize("name", nightly_except(STACKS, "two"))
 def test_voxels_match_the_plain_renderer(name: str) -> None:
     field, stack = fog(), EditStack(STACKS[name])
     fast = VoxelRenderer(field, stack, step=0.25).render(CAMERA)

@@ -36,6 +36,7 @@ def camera_at(eye: tuple[float, float, float], width: int = 320, height: int = 2
     return Camera.look_at(eye, (0, 0, 0), UP, width=width, height=height, fov_x=0.8)
 
 
+@pytest.mark.nightly
 def test_the_editor_places_changes_and_undoes_hotspots(tmp_path: Path) -> None:
     """Two pages see the same list; a mark is hidden behind the ball; texts are text."""
     camera = camera_at((0.0, -3.0, 0.0))

@@ -151,6 +151,7 @@ def test_a_turned_part_is_seen_by_its_canonical_directions() -> None:
     assert np.median(apart) < 1e-3 < 0.02 < np.median(anew)
 
 
+@pytest.mark.nightly
 def test_a_thin_rod_in_a_twisted_shell_is_not_missed() -> None:
     rod = Primitive(Cylinder(0.004, 0.9), GREY, pose_matrix((0.28, 0, 0))[None])
     scene = scene_of(rod, Primitive(Sphere(0.1), GREY, pose_matrix((0, 0, 0.5))[None]))

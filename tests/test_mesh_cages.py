@@ -237,6 +237,7 @@ def test_a_lattice_of_nodes_is_the_map() -> None:
     np.testing.assert_allclose(nodes + shell.sample(n), shell.to_canonical(nodes)[0], atol=1e-4)
 
 
+@pytest.mark.nightly
 def test_edits_without_room_say_so() -> None:
     near = Edit.continuous(CUBE, Cage.box((0, 0, 0), 0.81))
     with pytest.raises(EditError, match=r"no room: the gap between the mesh and the outer cage"):

@@ -116,6 +116,7 @@ def test_lattices_of_it_are_off_by_little() -> None:
     assert 0.0 < mean < most < 0.02
 
 
+@pytest.mark.nightly
 def test_what_cannot_be_is_refused() -> None:
     box = Cage.box((0, 0, 0), 0.5)
     with pytest.raises(EditError, match=r"a mesh as outer cage holds a mesh alone; give MeshCage\.of_box"):

@@ -35,7 +35,10 @@ edits:
 ALIKE = 33.0
 """dB between the page's whole picture and the server's, which is a JPEG of quality 95: about 40 by itself."""
 
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.nightly,
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 
 @pytest.fixture(scope="module")

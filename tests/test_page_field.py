@@ -20,6 +20,7 @@ from page_fields import lumps
 from scenes import ball_field
 
 
+@pytest.mark.nightly
 def test_pictures_come_back() -> None:
     check_pictures(lumps(2, False))
 

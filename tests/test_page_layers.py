@@ -77,6 +77,7 @@ def test_the_page_draws_patches_as_the_kernel_does(page: FieldPage, name: str) -
     check_patched(page, field, stack(field, name))
 
 
+@pytest.mark.nightly
 def test_the_page_draws_patches_of_an_unbounded_field(page: FieldPage) -> None:
     field = lumps(0, True)
     check_patched(page, field, stack(field, "after another"))

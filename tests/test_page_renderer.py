@@ -20,7 +20,10 @@ from page_fields import lumps_scene
 from page_shots import HALF, db, filled, shot
 from splat_scenes import splat_scene
 
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.nightly,
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 
 SIDES = 360, 220

@@ -25,7 +25,10 @@ edits:
 ALIKE = 32.0
 """dB between the page's whole picture and the server's, which is a JPEG of quality 95."""
 
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.nightly,
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 
 @pytest.fixture(scope="module")

@@ -276,9 +276,9 @@ STACKS = {
 @pytest.mark.parametrize(
     ("name", "preserve_opacity"),
     [
-        *((name, True) for name in ("twisted and deleted", "mirrored", "graded")),
+        *((name, True) for name in ("twisted and deleted", "mirrored")),
         ("stretched", False),
-        *(pytest.param(name, True, marks=pytest.mark.nightly) for name in ("moved", "copied")),
+        *(pytest.param(name, True, marks=pytest.mark.nightly) for name in ("moved", "copied", "graded")),
     ],
 )
 def test_the_page_draws_edits_as_the_rasterizer_does(

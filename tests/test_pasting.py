@@ -25,6 +25,7 @@ from cagefield.images.metrics import psnr
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.voxels.voxel_renderer import VoxelRenderer
 from cagefield.scene.scene import Scene
+from tiers import nightly_after_first
 
 THING = AnalyticField(
     [
@@ -116,7 +117,7 @@ def test_a_paste_is_the_picture_of_a_scene_that_has_the_thing(folder: Path, scal
     assert db(found.opacity, truth.opacity) > 44.0
 
 
-@pytest.mark.parametrize("kept", [True, False])
+@pytest.mark.parametrize("kept", nightly_after_first([True, False]))
 def test_what_the_cage_covers_is_seen_beside_the_thing(folder: Path, kept: bool) -> None:
     """The cage reaches over the place's blob, which the thing does not touch."""
     by = (0.3, -0.2, 0.1)
@@ -204,6 +205,7 @@ def test_the_other_scene_is_pasted_as_it_is_edited(folder: Path, tmp_path: Path)
     assert db(pictures[0].rgb, pictures[1].rgb) > 32.0
 
 
+@pytest.mark.nightly
 def test_degrees_of_color_that_differ(folder: Path) -> None:
     """Of a flat scene there is no view dependence to show, into a flat one none is shown."""
     place = Scene.open(folder / "place")

@@ -104,6 +104,7 @@ def test_right_poses_are_left_as_they_are_and_measured_once(capture, tmp_path, m
     assert again.dataset is capture and (again.before, again.outcome) == (found.before, "kept")
 
 
+@pytest.mark.nightly
 def test_perturbed_poses_are_adjusted_in_their_world_and_kept_for_next_time(capture, tmp_path, monkeypatch):
     wrong = perturbed(capture)
     found = verify_poses(wrong, cache=tmp_path)

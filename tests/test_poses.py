@@ -296,6 +296,7 @@ def test_photos_of_one_size_and_focal_length_share_a_camera(tmp_path):
     assert many[0].model.name == "RADIAL"  # one focal length: the pixels are square
 
 
+@pytest.mark.nightly
 def test_many_photos_are_matched_with_neighbors_and_with_those_alike(photos, tmp_path):
     names = sorted(file.name for file in photos.glob("0*.png"))  # eight of them, in the order of the ring
     camera = features.import_pycolmap().Camera(

@@ -104,6 +104,7 @@ def test_a_process_ends_with_the_one_that_started_it() -> None:
         assert process.wait(60) == 1
 
 
+@pytest.mark.nightly
 def test_a_stop_says_what_is_kept_and_the_same_command_continues(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -139,6 +139,7 @@ def test_a_photo_is_linear_in_the_exposure_and_as_noisy_as_stated():
     assert np.exp(np.log(exposure_gains(pictures, 0.0, rng)).mean()) == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.nightly
 def test_a_capture_is_read_as_photos_without_alpha_in_the_rooms_world(small):
     data = load_dataset(small)
     assert data.unbounded and not data.white_background

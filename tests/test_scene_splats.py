@@ -123,6 +123,7 @@ def test_voxels_of_splats_show_what_the_splats_show() -> None:
         assert np.median(shown.depth[middle]) == pytest.approx(np.median(expected.depth[middle]), abs=0.1)
 
 
+@pytest.mark.nightly
 def test_voxels_of_unbounded_splats_reach_beyond_their_box() -> None:
     ball = ball_of_splats()
     far = SplatField(

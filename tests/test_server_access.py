@@ -136,6 +136,7 @@ def another(tmp_path: Path) -> Path:
     return tmp_path / "scene"
 
 
+@pytest.mark.nightly
 def test_pages_over_tls(another: Path, certificate: tuple[Path, Path]) -> None:
     file, key = certificate
     trusting = ssl.create_default_context(cafile=str(file))
@@ -169,6 +170,7 @@ def test_certificates_that_are_none(
     assert "give that too" in refused(capsys, "view", scene, "--certificate-key", key)
 
 
+@pytest.mark.nightly
 def test_a_token_from_a_file(another: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "token"
     file.write_text("a-token-of-mine\n")

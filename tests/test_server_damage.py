@@ -301,6 +301,7 @@ def shaded() -> Scene:
     return scene
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", PATCHED)
 def test_switching_fill_and_light_changes_pictures_where_patches_reach(shaded: Scene, name: str) -> None:
     patched = PATCHED[name]

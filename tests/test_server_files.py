@@ -312,6 +312,7 @@ def test_a_file_that_is_too_large_is_refused_by_what_it_says_and_by_what_comes(
         asyncio.run(editor.open("a.ply", _blocks(b"ply"), 4))
 
 
+@pytest.mark.nightly
 def test_a_dropped_file_takes_the_scenes_place_and_pages_come_again(
     server: EditorServer, tmp_path: Path
 ) -> None:
@@ -392,6 +393,7 @@ def keyframe(parts: dict[str, float]) -> dict[str, Any]:
     return {"c2w": camera.c2w.ravel().tolist(), "fov_y_deg": 40.0, "seconds": 1.0, "parts": parts}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("form", nightly_after_first(["ply", "usdc"]))
 def test_frames_of_the_camera_path_download_as_their_videos_show_them(
     server: EditorServer, tmp_path: Path, form: str

@@ -464,6 +464,7 @@ def test_a_cancelled_video_leaves_nothing(server: EditorServer, tmp_path: Path) 
         assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.nightly
 def test_a_server_that_is_killed_in_a_drag_loses_no_more_than_the_drag(tmp_path: Path) -> None:
     scene = tmp_path / "ball"
     ball_scene().save(scene)

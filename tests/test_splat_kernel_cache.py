@@ -45,6 +45,7 @@ def ask(cache: Path, trouble: str = "") -> tuple[str, list[str]]:
     return done.stdout.strip(), done.stderr.splitlines()
 
 
+@pytest.mark.nightly
 def test_a_second_process_loads_its_kernels_from_the_disk(tmp_path: Path) -> None:
     assert ask(tmp_path) == ("True False 0", [])
     assert ask(tmp_path) == ("True False 1", [])
@@ -56,6 +57,7 @@ def test_a_second_process_loads_its_kernels_from_the_disk(tmp_path: Path) -> Non
     assert len(warned) == 1 and "compiled kernels cannot be kept in" in warned[0]
 
 
+@pytest.mark.nightly
 def test_a_new_installation_of_the_same_source_loads_its_kernels(tmp_path: Path) -> None:
     """It writes the files of the source anew, with other times."""
     module = tmp_path / "installed.py"

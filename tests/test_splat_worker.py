@@ -48,6 +48,7 @@ from splat_worker_requests import (
     mesh_arrays,
     running_worker,
 )
+from tiers import nightly_after_first
 
 ROOT = Path(__file__).parents[1]
 TIMEOUT_S = 600.0
@@ -414,6 +415,7 @@ def test_splats_of_wrong_shapes_are_refused() -> None:
 # ---- the add-on's connection ----
 
 
+@pytest.mark.nightly
 def test_of_requests_that_wait_only_the_newest_is_sent() -> None:
     client = addon_module("worker")
     client.START_TIMEOUT_S = TIMEOUT_S
@@ -495,7 +497,10 @@ def test_the_process_answers_refuses_and_goes_on(tmp_path: Path) -> None:
         assert again.arrays[name].tobytes() == reply.arrays[name].tobytes()
 
 
-@pytest.mark.parametrize("content", [MALFORMED[1][0], MALFORMED[0][0], raw(listing(["a", "object", [1]]))])
+@pytest.mark.parametrize(
+    "content",
+    nightly_after_first([MALFORMED[1][0], MALFORMED[0][0], raw(listing(["a", "object", [1]]))]),
+)
 def test_a_malformed_frame_ends_the_process_with_one_line(content: bytes) -> None:
     done = subprocess.run(COMMAND, input=content, capture_output=True, timeout=TIMEOUT_S)
     assert done.returncode == 2

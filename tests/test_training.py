@@ -126,6 +126,7 @@ class _Clock:
         return self.now
 
 
+@pytest.mark.nightly
 def test_snapshots_are_the_field_on_the_way_and_take_no_training_time(dataset, trained, monkeypatch):
     fields, seconds = {}, {}
     clock = _Clock()

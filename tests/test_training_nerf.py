@@ -236,6 +236,7 @@ def test_the_voxels_of_a_nerf_have_the_degree_that_is_asked_for(
     assert found == [degree]
 
 
+@pytest.mark.nightly
 def test_a_training_whose_baking_failed_is_kept(photos, tmp_path, capsys, monkeypatch) -> None:
     monkeypatch.setattr(NerfConfig, "small", classmethod(lambda cls, **options: tiny(**options)))
     argv = [photos, "-o", tmp_path / "scene", *QUICK]

@@ -205,6 +205,7 @@ def test_a_resumed_run_ends_where_an_uninterrupted_one_does(kind, request, tmp_p
         NerfRun(dataset, tiny(ndc=False)).restore(tmp_path / "state")
 
 
+@pytest.mark.nightly
 def test_the_command_writes_a_scene_that_the_editor_can_show(forward, tmp_path, capsys, monkeypatch) -> None:
     monkeypatch.setattr(NerfConfig, "small", classmethod(lambda cls, **options: tiny(**options)))
     argv = [forward, "-o", tmp_path / "scene", "--field", "nerf", "--steps", 120, "--resolution", 48]

@@ -99,6 +99,7 @@ def test_rough_poses_are_refined(rough):
     ]
 
 
+@pytest.mark.nightly
 def test_refined_poses_go_on_where_a_run_was_interrupted(rough, tmp_path):
     dataset, _ = rough
     config = SplatConfig(steps=120, splats=400, sh_degree=1, refine_poses=True)

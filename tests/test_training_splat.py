@@ -128,6 +128,7 @@ def test_a_stored_run_goes_on_alike(capture, tmp_path):
         np.testing.assert_array_equal(getattr(other.state, part.name), getattr(run.state, part.name))
 
 
+@pytest.mark.nightly
 def test_a_damaged_or_foreign_checkpoint_is_refused(capture, tmp_path):
     config = replace(CONFIG, steps=3)
     with pytest.raises(CagefieldError, match=r"no checkpoint at .* start anew"):
@@ -192,6 +193,7 @@ def test_cut_outs_stay_transparent_where_the_photos_are(ball, tmp_path):
         assert frame.opacity[alpha > 250].mean() > 0.85
 
 
+@pytest.mark.nightly
 def test_exposures_of_the_photos_are_found(capture, tmp_path):
     views = capture.train
     gains = np.random.default_rng(1).uniform(0.6, 1.0, (len(views), 3))
@@ -208,6 +210,7 @@ def test_exposures_of_the_photos_are_found(capture, tmp_path):
     np.testing.assert_array_equal(off.gains, 1.0)
 
 
+@pytest.mark.nightly
 def test_more_and_more_splats_are_left_out_of_the_pictures_by_chance(capture):
     def seen(dropout: float, done: float) -> int:
         run = SplatRun(capture, SplatConfig(steps=100, splats=400, dropout=dropout))
@@ -374,6 +377,7 @@ def test_points_that_are_all_the_same_do_no_harm(capture):
     np.testing.assert_array_equal(again.log_scales, once.log_scales)
 
 
+@pytest.mark.nightly
 def test_photos_of_another_size_and_distance_do_not_mislead_the_sweep(ball, capture, tmp_path):
     """They are left out of it, with their depths."""
     cameras = turntable((0, 0, 0), 4.5, 2, elevation=0.1, width=60, height=48, fov_x=0.4)

@@ -256,6 +256,7 @@ def test_a_renderer_that_starts_again_shows_the_scene_that_was_opened(tmp_path: 
         worker.close()
 
 
+@pytest.mark.nightly
 def test_a_renderer_is_not_given_half_a_scene(tmp_path: Path) -> None:
     """There is no room for the copy: that is said, and no other scene shown."""
     folder = tmp_path / "scene"

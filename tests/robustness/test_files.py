@@ -29,22 +29,26 @@ INPUTS = 1
 """Inputs of each reader with every change; nightly runs of the benchmark try 200."""
 
 
-SLOW = ("training, voxels", "training, splats", "training, nerf", "usda", "usdc", "usdz")
-"""Readers whose honest seeds are trained, or that read in a process of their own."""
+EVERY_RUN = (
+    *("edits.yaml", "scene folder", "voxel field", "splat field", "autosave", "hotspots", "camera path"),
+    *("nerf .tar, new", "TensoRF .th", "svox2 .npz", "nerfacto .ckpt", "Instant-NGP .ingp", "SVRaster .pt"),
+    *("transforms.json", "COLMAP, binary", "LLFF", "png", "compressed.ply", "spz 3", "sog", "glb scene"),
+    *("poses.json", "token", "messages"),
+)
+"""Readers of every kind of file; the others are tried nightly."""
 
 
 @pytest.fixture(scope="module")
 def outcomes() -> dict[str, Outcome]:
-    """Outcomes of some inputs of every reader but the slow ones, all in one process."""
-    return attack(
-        [name for name in READERS if name not in SLOW and _why_not(name) is None], 0, INPUTS, "tests"
-    )
+    """Outcomes of some inputs of the readers of every run, all in one process."""
+    return attack([name for name in EVERY_RUN if _why_not(name) is None], 0, INPUTS, "tests")
 
 
 @pytest.fixture(scope="module")
-def slow_outcomes() -> dict[str, Outcome]:
-    """Outcomes of some inputs of the slow readers, all in one process."""
-    return attack([name for name in SLOW if _why_not(name) is None], 0, INPUTS, "tests")
+def other_outcomes() -> dict[str, Outcome]:
+    """Outcomes of some inputs of the other readers, all in one process."""
+    others = [name for name in READERS if name not in EVERY_RUN]
+    return attack([name for name in others if _why_not(name) is None], 0, INPUTS, "tests")
 
 
 def _why_not(name: str) -> str | None:
@@ -56,15 +60,15 @@ def _why_not(name: str) -> str | None:
     return None
 
 
-@pytest.mark.parametrize("name", [name for name in READERS if name not in SLOW])
+@pytest.mark.parametrize("name", EVERY_RUN)
 def test_damaged_files(name: str, outcomes: dict[str, Outcome]) -> None:
     check_outcome(name, outcomes)
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("name", SLOW)
-def test_damaged_files_of_slow_readers(name: str, slow_outcomes: dict[str, Outcome]) -> None:
-    check_outcome(name, slow_outcomes)
+@pytest.mark.parametrize("name", [name for name in READERS if name not in EVERY_RUN])
+def test_damaged_files_of_other_readers(name: str, other_outcomes: dict[str, Outcome]) -> None:
+    check_outcome(name, other_outcomes)
 
 
 def check_outcome(name: str, outcomes: dict[str, Outcome]) -> None:

@@ -22,6 +22,7 @@ from kills import COMMANDS, SLOW_COMMANDS, Killed, calls_of, hidden, kill
 from cagefield.files.stale_files import hidden_name
 from cagefield.images.image_files import write_png
 from scenes import files_of
+from tiers import nightly_after_first
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(os, "fork"), reason="this system forks no processes"),
@@ -32,14 +33,14 @@ pytestmark = [
 @pytest.mark.parametrize(
     ("name", "least", "step"),
     [
-        ("edit --overwrite", 15, 3),
         ("edit --overwrite, renames", 15, 9),
-        ("changes and saves", 60, 15),
-        ("save as", 15, 5),
         ("convert .sog", 8, 4),
         ("export .glb", 8, 4),
         ("hotspot", 4, 2),
-        ("export, a sequence", 12, 5),
+        pytest.param("edit --overwrite", 15, 3, marks=pytest.mark.nightly),
+        pytest.param("changes and saves", 60, 15, marks=pytest.mark.nightly),
+        pytest.param("save as", 15, 5, marks=pytest.mark.nightly),
+        pytest.param("export, a sequence", 12, 5, marks=pytest.mark.nightly),
     ],
 )
 def test_killed_at_a_call_that_writes(tmp_path: Path, name: str, least: int, step: int) -> None:
@@ -102,7 +103,7 @@ def test_a_process_ends_in_the_middle_of_a_write(tmp_path: Path) -> None:
 
 @needs_counted_writes
 @pytest.mark.parametrize(
-    ("name", "least", "step"), [("edit --overwrite", 6, 3), ("changes and saves", 14, 6)]
+    ("name", "least", "step"), nightly_after_first([("edit --overwrite", 6, 3), ("changes and saves", 14, 6)])
 )
 def test_killed_in_the_middle_of_a_write(tmp_path: Path, name: str, least: int, step: int) -> None:
     found = Killed()

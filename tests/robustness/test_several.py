@@ -87,6 +87,7 @@ def test_two_people_drag_one_edit(server: EditorServer) -> None:
         np.testing.assert_allclose(middle(settled(one), edit), (0.1, 0.0, 0.0), atol=1e-5)
 
 
+@pytest.mark.nightly
 def test_one_removes_what_another_drags(server: EditorServer) -> None:
     with page(server) as (one, _), page(server) as (two, _):
         ball, other = (edit["id"] for edit in one.joined["edits"])
@@ -107,6 +108,7 @@ def test_one_removes_what_another_drags(server: EditorServer) -> None:
         np.testing.assert_allclose(middle(state, ball), 0.0, atol=1e-5)
 
 
+@pytest.mark.nightly
 def test_one_saves_while_another_drags(server: EditorServer, scene: Path) -> None:
     """The file has the edits without the drag, which goes on, and is there with the next save."""
     with page(server) as (one, _), page(server) as (two, _):

@@ -12,9 +12,10 @@ from flood_kinds import frame, page_line
 from certificates import certificate_of_localhost
 from editor_server import EditorServer, editor_server, page
 from scenes import ball_scene
+from tiers import nightly_after_first
 
 
-@pytest.fixture(scope="module", params=["http", "https"])
+@pytest.fixture(scope="module", params=nightly_after_first(["http", "https"]))
 def server(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[EditorServer]:
