@@ -349,7 +349,7 @@ class Scene:
         plain = cache(lambda: renderer_of(self.rendered_field))
 
         def render(camera: Camera) -> RenderResult:
-            return plain().render(camera, background="black", normals=True, proceed=check_cancelled)
+            return plain().render(camera, background="black", normals=False, proceed=check_cancelled)
 
         cameras = self.cameras.get("train", ())
         return Patcher(self.rendered_field, cameras, render, PasteLoader(self.sources))
