@@ -28,6 +28,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
         "test_edit_refresh",
         "test_renderer_parts",
     ),
+    "splats on the device": ("test_splat_training_device", "test_splat_device", "test_device_sorting"),
     "editors of the trained digger": (
         "test_editor_panel",
         "test_editor_page",
@@ -39,27 +40,28 @@ FAMILIES: dict[str, tuple[str, ...]] = {
         "test_cli_train",
         "test_training_schedule",
     ),
-    "splats on the device": ("test_splat_training_device", "test_splat_device", "test_device_sorting"),
 }
-"""Files that compile the same kernels in the test process, or have a fixture of the session in common."""
+"""Files that compile the same kernels in the test process, or have a fixture of the session in common; those
+that compile most come first, so that the others find kernels of Numba on the disk."""
 
 LONG: tuple[str, ...] = (
-    "test_files",
-    "test_page_renderer",
     "test_editor_gestures",
-    "test_page_drags",
-    "test_pose_verification",
-    "test_poses_stopped",
     "test_poses",
-    "test_captures",
-    "test_cli_export",
-    "test_kills",
-    "test_changing",
+    "test_training_splat",
+    "test_server_socket",
+    "test_flow_shell",
     "test_training_nerf",
+    "test_captures",
+    "test_page_splats",
+    "test_kills",
+    "test_cli_export",
+    "test_files",
+    "test_server_files",
+    "test_datasets_points",
     "test_deformed_splats",
+    "test_pose_verification",
     "test_several",
     "test_disks",
-    "test_examples",
 )
 """Other files whose tests take long, by measured CPU time."""
 
