@@ -49,6 +49,7 @@ def test_train_writes_a_scene(photos: Path, tmp_path: Path, capsys: pytest.Captu
     assert float(match[3]) > 14.0
 
 
+@pytest.mark.nightly
 def test_photos_too_small_for_ssim_give_a_scene_without_that_figure(
     photos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -142,6 +142,7 @@ def test_a_cluster_goes_on_with_the_blocks_of_an_interrupted_training(
     assert "block 2: done" in capsys.readouterr().err
 
 
+@pytest.mark.nightly
 @pytest.mark.train
 def test_several_captures_are_trained_into_scenes_of_their_own(
     street: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

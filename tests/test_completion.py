@@ -150,6 +150,7 @@ def test_the_fit_finds_the_shade_and_none_where_none_is(scenes: tuple[Scene, Sce
     assert sum(bare.weights) < 0.2
 
 
+@pytest.mark.nightly
 def test_shadows_go_along(scenes: tuple[Scene, Scene]) -> None:
     """The box at its new place shades the floor there, about as much as where it stood."""
     scene, truth = scenes
@@ -322,6 +323,7 @@ def test_strange_cages_are_patched_without_a_traceback(scenes: tuple[Scene, Scen
             assert np.isfinite(scene.with_edits(EditStack([edit])).render(cameras()[0]).rgb).all()
 
 
+@pytest.mark.nightly
 def test_a_field_of_nothing_solid_is_patched() -> None:
     field = room(True)
     thin = dataclasses.replace(field, density=np.full_like(field.density, 1e-3))

@@ -89,6 +89,7 @@ def test_light_changes_matter_only_right_under_what_is_lifted_and_far_things_kee
     assert moved.max() > 0.1 and moved[away > 0.25 * np.sqrt(2.0) + 1.3 * REACH].max() < 0.01
 
 
+@pytest.mark.nightly
 def test_what_was_hidden_under_what_is_lifted_is_ground():
     """Noise in the ground there, that no camera sees, and crumbs over it, do not show."""
     field = room(0.0)
@@ -121,6 +122,7 @@ def test_what_was_hidden_under_what_is_lifted_is_ground():
     np.testing.assert_array_equal(block.density, plain.density)
 
 
+@pytest.mark.nightly
 def test_fog_between_the_ground_and_what_is_lifted_makes_no_veil():
     """Thin as it was, an edit that lifts a part would draw it out, also beside what is filled."""
     field = room(0.0)

@@ -97,6 +97,7 @@ def test_no_sun_is_found_where_none_shines() -> None:
     assert dull.patcher._model_for(moved("shadow")[0]).directional is None
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("relight", nightly_after_first(["shadow", CastShadow((6.0, 3.0, 7.4))]))
 def test_a_moved_box_takes_its_cast_shadow_along(lit: Scene, relight: str | CastShadow) -> None:
     truth = seen(scene(room(TO)))

@@ -290,6 +290,7 @@ def test_meshes_and_point_clouds_say_what_can_be_done(tmp_path: Path) -> None:
             read_splats(asset.write(tmp_path / "a.glb"))
 
 
+@pytest.mark.nightly
 def test_nodes_in_a_circle_are_refused_and_deep_ones_read(tmp_path: Path) -> None:
     field = random_splats(3)
     asset = scene_of(field)

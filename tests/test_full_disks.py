@@ -274,6 +274,7 @@ def test_a_field_that_is_missed_when_its_file_is_closed(
     assert caught.value.filename == str(file) and files_of(tmp_path) == {file.name: b"old"}
 
 
+@pytest.mark.nightly
 def test_a_curve_stays_where_the_scene_that_goes_with_it_does_not_fit(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -105,7 +105,7 @@ def test_the_falloff_is_one_inside_zero_outside_and_monotonous() -> None:
         assert np.abs(steps).max() < 0.1
 
 
-@pytest.mark.parametrize("name", nightly_except(STACKS, "grade alone", "turned, lattice", "two"))
+@pytest.mark.parametrize("name", nightly_except(STACKS, "grade alone", "two"))
 def test_the_kernels_grade_is_the_references(name: str) -> None:
     stack = EditStack(STACKS[name])
     rng = np.random.default_rng(2)
@@ -131,6 +131,7 @@ def test_voxels_match_the_plain_renderer(name: str) -> None:
     assert psnr(fast.rgb, plain.rgb) > 45.0
 
 
+@pytest.mark.nightly
 def test_a_uniform_grade_is_the_matrix_on_the_picture() -> None:
     field = fog()
     everything = Cage.box((0, 0, 0), 4.0)

@@ -218,6 +218,7 @@ def test_degrees_of_color_that_differ(folder: Path) -> None:
         assert 18.0 < db(found.rgb, full.rgb) < 34.0
 
 
+@pytest.mark.nightly
 def test_surroundings_get_a_shadow(tmp_path: Path) -> None:
     """As of a copy: the floor beside the thing is darker with relight, and nothing else is."""
     from test_completion import FLOOR, cameras, room
@@ -370,6 +371,7 @@ def test_points_of_the_own_field_stay() -> None:
     np.testing.assert_array_equal(mapped.points, points)
 
 
+@pytest.mark.nightly
 def test_a_ball_of_one_color_keeps_its_opacity(tmp_path: Path) -> None:
     """Along the middle of a ball, the optical depth is that of the ball, whatever its size."""
     ball = AnalyticField([UniformSphere((0, 0, 0), 0.4, 2.0, (0.5, 0.5, 0.5))])

@@ -90,6 +90,7 @@ def test_what_takes_the_place_of_a_file_meanwhile_is_no_file(
         open_regular(tmp_path / "pipe")
 
 
+@pytest.mark.nightly
 def test_a_file_that_grows_is_read_no_further(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "a").write_bytes(bytes(MAX_TEXT_BYTES + 1))
     monkeypatch.setattr("cagefield.files.safe_open.check_regular", lambda *_: 0)

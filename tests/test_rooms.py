@@ -159,6 +159,7 @@ def test_a_capture_is_read_as_photos_without_alpha_in_the_rooms_world(small):
     assert values["camera_model"] == "OPENCV" and values["frames"][0]["colmap_im_id"] == 1
 
 
+@pytest.mark.nightly
 def test_the_colmap_model_beside_agrees_with_transforms_and_knows_who_sees_what(small):
     pytest.importorskip("pycolmap")
     data = load_dataset(small)

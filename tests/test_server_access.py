@@ -159,6 +159,7 @@ def test_pages_over_tls(another: Path, certificate: tuple[Path, Path]) -> None:
             urllib.request.urlopen(f"http://localhost:{server.port}/", timeout=20)
 
 
+@pytest.mark.nightly
 def test_certificates_that_are_none(
     scene: Path, certificate: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -25,7 +25,7 @@ from cagefield.server.render_worker.tasks import PictureDone, PictureTask, Shown
 from cagefield.server.render_worker.view import Display, Region
 from scenes import ball_field, ball_scene
 from sent_pictures import pixels_of
-from tiers import nightly_except
+from tiers import nightly_after_first, nightly_except
 
 SIDE = 64
 CAMERA = Camera.look_at((0.6, -3.4, 0.9), (0, 0, 0), width=SIDE, height=SIDE, fov_x=0.8)
@@ -271,7 +271,7 @@ STACKS = {
 }
 
 
-@pytest.mark.parametrize("name", STACKS)
+@pytest.mark.parametrize("name", nightly_after_first(STACKS))
 def test_pictures_are_the_same_outside_what_is_rendered(renderers: RendererCache, name: str) -> None:
     before, after = (EditStack(stack) for stack in STACKS[name])
     first, second = (renderers.plain.with_edits(stack).render(CAMERA) for stack in (before, after))
@@ -320,6 +320,7 @@ def test_switching_fill_and_light_changes_pictures_where_patches_reach(shaded: S
     assert difference.max() < 1e-3 and w * h < 0.5 * SIDE * SIDE
 
 
+@pytest.mark.nightly
 def test_edits_that_stay_keep_their_shadows_while_another_moves(shaded: Scene) -> None:
     edits = [PATCHED["copy"], PATCHED["move"]]
     settled = shaded.patcher.prepare(edits)

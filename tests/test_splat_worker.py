@@ -185,6 +185,7 @@ def test_operations_lead_to_the_target(moved: Cage, count: int | None) -> None:
     assert count is None or found == count
 
 
+@pytest.mark.nightly
 def test_operations_lead_lattices_and_meshes_to_their_targets() -> None:
     lattice = INNER.subdivided((1, 1, 3))
     random = np.random.default_rng(0)

@@ -346,6 +346,7 @@ def test_one_block_is_the_training_without_blocks(capture: Dataset, tmp_path: Pa
     assert merged.test_psnr == pytest.approx(alone.test_psnr, abs=1e-3) and merged.finished
 
 
+@pytest.mark.nightly
 @pytest.mark.train
 def test_finished_blocks_are_not_trained_again(
     capture: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
