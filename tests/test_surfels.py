@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+import pytest
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from cagefield.cameras.camera import Camera
@@ -13,6 +15,7 @@ from cagefield.completion.surfaces.grid_block import extract_block
 from cagefield.completion.surfaces.plane_snapping import snap_to_planes
 from cagefield.completion.surfaces.surfels import (
     FAR_DISTANCE,
+    QUERY_POINTS,
     Surfels,
     build_distance_grid,
     concatenate_surfels,
@@ -20,6 +23,7 @@ from cagefield.completion.surfaces.surfels import (
     extract_surfels,
     prefer_visible,
 )
+from cagefield.compute.cancellation import cancellable
 from cagefield.edits import Edit, EditStack
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
@@ -220,3 +224,25 @@ def test_a_part_that_stands_free_is_not_thinned_by_its_seam() -> None:
     )
     error = float(((hard.rgb - soft.rgb) ** 2).mean())
     assert -10.0 * np.log10(max(error, 1e-9)) > 36.0
+
+
+def test_searches_for_neighbors_are_cancelled_between_parts() -> None:
+    rng = np.random.default_rng(3)
+    surfels = Surfels(rng.normal(size=(500, 3)), rng.normal(size=(500, 3)))
+    points = rng.normal(size=(2 * QUERY_POINTS + 7, 3))
+    distances, rows = cKDTree(surfels.points).query(points, k=3, distance_upper_bound=0.4)
+    asked: list[int] = []
+    with cancellable(lambda: asked.append(len(asked))):
+        found = surfels.nearest(points, 3, 0.4)
+    np.testing.assert_array_equal(found[0], distances)
+    np.testing.assert_array_equal(found[1], rows)
+    assert len(asked) == 3
+
+    class Stopped(Exception):
+        pass
+
+    def stop() -> None:
+        raise Stopped
+
+    with cancellable(stop), pytest.raises(Stopped):
+        surfels.distance(points)

@@ -82,5 +82,9 @@ class SplatGrid:
         threads = os.cpu_count() or 1
         slabs = min(self.count[0], SLABS_PER_THREAD * threads)
         ends: NDArray[np.int64] = np.linspace(0, self.count[0], slabs + 1).astype(np.int64)
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(add, ends[:-1].tolist(), ends[1:].tolist()))
+        pool = ThreadPoolExecutor(threads)
+        try:
+            for _ in pool.map(add, ends[:-1].tolist(), ends[1:].tolist()):
+                check_cancelled()
+        finally:
+            pool.shutdown(cancel_futures=True)

@@ -125,6 +125,7 @@ def _smooth_normals(surface: Surfels, rows: NDArray[np.int64], radius: float) ->
     has_neighbor = np.isfinite(distance)
     neighbor_normals = surface.normals[np.where(has_neighbor, neighbor_rows, 0)]
     for _ in range(NORMAL_SMOOTHING_ROUNDS):
+        check_cancelled()
         normals = average_normals(normals, neighbor_normals, has_neighbor, MIN_NEIGHBOR_COSINE)
     return Surfels(points, normals)
 

@@ -53,7 +53,9 @@ def voxelize_splats(splats: SplatField, box: Array, voxel: float) -> VoxelField:
     count = np.maximum(np.ceil((box[1] - box[0]) / voxel).astype(np.int64), 2) + 1
     bounds = box.mean(axis=0) + 0.5 * voxel * (count - 1) * np.array([[-1.0], [1.0]])
     wide = _widen_splats(splats, bounds, voxel)
+    check_cancelled()
     covered = _covered_vertices(wide, bounds[0], voxel, count)
+    check_cancelled()
     grid = SplatGrid(wide, bounds[0], voxel, (int(count[0]), int(count[1]), int(count[2])))
     density = np.where(covered, grid.density(), np.float32(0.0))
     is_stored = density * voxel > MIN_OPTICAL_DEPTH
@@ -92,10 +94,10 @@ def _covered_vertices(splats: SplatField, low: Array, voxel: float, count: NDArr
     first = np.clip(np.ceil((splats.means - half - low) / voxel).astype(np.int64), 0, count)
     end = np.clip(np.floor((splats.means + half - low) / voxel).astype(np.int64) + 1, 0, count)
     # A box is a pattern of signs at its corners; cumulative sums along the axes count the boxes at a vertex.
-    steps = np.zeros(count + 1, np.int32)
-    for corner in range(8):
-        upper = np.array([corner & 1, corner >> 1 & 1, corner >> 2 & 1], bool)
-        sign = -1 if int(upper.sum()) % 2 else 1
-        np.add.at(steps, tuple(np.where(upper, end, first).T), sign)
+    ends = np.stack([first, end])
+    corners = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(8, 3)
+    places = [np.ravel_multi_index(ends[corner, :, range(3)], tuple(count + 1)) for corner in corners]
+    signs = np.repeat((-1.0) ** corners.sum(axis=1), len(first))
+    steps = np.bincount(np.concatenate(places), signs, int(np.prod(count + 1))).reshape(count + 1)
     covering = steps.cumsum(0).cumsum(1).cumsum(2)[:-1, :-1, :-1]
     return np.asarray(covering > 0)

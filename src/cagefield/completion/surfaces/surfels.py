@@ -70,6 +70,9 @@ HIDDEN_DEPTH_VOXELS = 8.0
 DUPLICATE_DISTANCE_VOXELS = 1.5
 """Distance from a visible surface up to which a block's own surfels are duplicates, voxels."""
 
+QUERY_POINTS = 2048
+"""Points of one query for neighbors, between which a computation can be cancelled."""
+
 MIN_SMOOTHING_COSINE = 0.7
 """Minimum cosine between normals that are averaged."""
 
@@ -90,10 +93,10 @@ class Surfels:
 
         FAR_DISTANCE and False beyond `radius`, world units.
         """
-        check_cancelled()
         distance, behind = np.full(len(points), FAR_DISTANCE), np.zeros(len(points), bool)
         if len(self.points) and len(points):
-            nearest_distance, nearest = self._tree.query(points, distance_upper_bound=radius, workers=-1)
+            distances, rows = self.nearest(points, 1, radius)
+            nearest_distance, nearest = distances[:, 0], rows[:, 0]
             in_radius = np.flatnonzero(np.isfinite(nearest_distance))
             distance[in_radius] = nearest_distance[in_radius]
             offset = points[in_radius] - self.points[nearest[in_radius]]
@@ -132,11 +135,15 @@ class Surfels:
 
         A neighbor beyond `radius`, world units, has distance inf and row N.
         """
-        check_cancelled()
-        distances, rows = self._tree.query(
-            points, k=[*range(1, count + 1)], distance_upper_bound=radius, workers=-1
-        )
-        return np.asarray(distances), np.asarray(rows)
+        distances = np.empty((len(points), count))
+        rows = np.empty((len(points), count), np.int64)
+        for begin in range(0, len(points), QUERY_POINTS):
+            check_cancelled()
+            part = slice(begin, begin + QUERY_POINTS)
+            distances[part], rows[part] = self._tree.query(
+                points[part], k=[*range(1, count + 1)], distance_upper_bound=radius, workers=-1
+            )
+        return distances, rows
 
     def take(self, rows: Mask | NDArray[np.int64]) -> Surfels:
         """Surfels of the given rows or mask."""

@@ -125,7 +125,9 @@ def render_visibility(
     for camera in used:
         check_cancelled()
         image = render(camera)
+        check_cancelled()
         surface, solid = _image_surfels(image, camera)
+        check_cancelled()
         colors = np.clip(image.rgb.reshape(-1, 3), 0.02, 1.0)
         mean = colors.mean(axis=1)
         log_mean = np.log(mean)
@@ -186,6 +188,7 @@ def _image_surfels(image: RenderResult, camera: Camera) -> tuple[Surfels, Mask]:
     solid &= ~ndimage.binary_dilation(jump > MIN_EDGE_DEPTH_SHARE * np.where(solid, depth, 1.0), iterations=1)
     origins, directions = camera.rays()
     points = origins + np.where(solid, depth, 0.0).reshape(-1, 1) * directions
+    check_cancelled()
     return Surfels(points, _image_normals(points.reshape(*solid.shape, 3), origins[0], solid)), solid
 
 

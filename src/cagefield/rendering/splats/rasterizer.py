@@ -18,6 +18,7 @@ from scipy.special import spence
 from cagefield.cameras import lenses
 from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.rendering.splats.kernels import blending, projection, tile_binning
 from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE_PX
 from cagefield.rendering.splats.kernels.splat_args import CameraArgs, ProjectedSplats
@@ -235,6 +236,7 @@ def project(
         part = tiles[begin:end] if len(source.rows) == end - begin else tiles[begin:end][source.rows]
         shown.append(source.rows[part[:, 1] > part[:, 0]] + np.int32(begin))
         begin = end
+    check_cancelled()
     tiled = pairs_of_tiles(np.concatenate(shown), keys, tiles, packed, False, width, height, buffers)
     return Projection(packed, *tiled, width, height)
 
