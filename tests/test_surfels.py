@@ -238,11 +238,11 @@ def test_searches_for_neighbors_are_cancelled_between_parts() -> None:
     np.testing.assert_array_equal(found[1], rows)
     assert len(asked) == 3
 
-    class Stopped(Exception):
+    class StoppedError(Exception):
         pass
 
     def stop() -> None:
-        raise Stopped
+        raise StoppedError
 
-    with cancellable(stop), pytest.raises(Stopped):
+    with cancellable(stop), pytest.raises(StoppedError):
         surfels.distance(points)
