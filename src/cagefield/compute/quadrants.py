@@ -7,6 +7,9 @@ Quadrants 1.3 keeps the arguments of launches by the identity of the objects tha
 arrays in them live. A new frozen dataclass at the address of one that is gone would launch with the fields of
 the old one, another camera or photo; so no launch is kept.
 
+For each kernel that is defined, Quadrants looks through all loaded modules for a class around it, which takes
+a third of the time that kernel modules take to import. No kernel here is a method.
+
 CUDA frees memory only in threads that have its context, and ends the program in others. Python collects
 garbage in whichever thread asks for memory; so an array that is collected elsewhere waits until the thread
 that made the first one makes or frees another.
@@ -24,7 +27,7 @@ if _HIDDEN:
     sys.modules["torch"] = cast(Any, None)
 try:
     import quadrants as qd
-    from quadrants.lang import impl
+    from quadrants.lang import impl, kernel_impl
     from quadrants.lang._fast_caching import args_hasher
     from quadrants.lang._ndarray import Ndarray
     from quadrants.lang.kernel import LaunchContextBufferCache
@@ -40,6 +43,13 @@ def _keep_no_launch(*_: object) -> None:
 
 
 LaunchContextBufferCache.cache = _keep_no_launch  # type: ignore[method-assign, unused-ignore]
+
+def _is_no_method(level_of_class_stackframe: int) -> bool:
+    """Stands for `kernel_impl._inside_class`; see above."""
+    return False
+
+
+kernel_impl._inside_class = _is_no_method
 
 _owner: int | None = None
 """Thread that made the first device array."""
