@@ -16,6 +16,7 @@ from cagefield.server.editor.edit_texts import read_edits
 from cagefield.server.editor.pasting import build_paste
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import (
+    alignment_messages,
     client_messages,
     common,
     hotspot_messages,
@@ -29,7 +30,6 @@ from cagefield.server.protocol.conversion import (
     dragged_of,
     keys_of,
     operation_of,
-    stills_of,
     view_height,
 )
 from cagefield.server.render_queue.coordinator import Coordinator, Page
@@ -43,7 +43,8 @@ from cagefield.server.render_worker.tasks import (
     values_of,
 )
 from cagefield.server.render_worker.view import Display
-from cagefield.server.web.hotspot_handlers import change_hotspots
+from cagefield.server.web.alignment_handlers import change_alignment
+from cagefield.server.web.hotspot_handlers import change_hotspots, path_of
 from cagefield.server.web.point_handlers import PointChange, change_points
 from cagefield.server.web.selection_handlers import change_selection, histogram_of
 from cagefield.server.web.worker_threads import run_in_thread
@@ -146,10 +147,7 @@ class MessageHandlers:
             counts = await histogram_of(self._coordinator, message.attribute)
             return server_messages.Answer(request=message.request, histogram=counts)
         if message.what == "path":
-            document = self._session.document
-            return server_messages.Answer(
-                request=message.request, stills=stills_of(document.keys, document.loop)
-            )
+            return await path_of(self._session, message.request)
         found = await self._surface(message.x, message.y)
         if found is None:
             return server_messages.Answer(request=message.request)
@@ -282,11 +280,10 @@ class MessageHandlers:
     @_handles(client_messages.PasteScene)
     async def _paste_scene(self, message: client_messages.PasteScene) -> None:
         path = self._coordinator.store.source_of(message.source)
-        box, up, own_up = await self._coordinator.ask(lambda number: LookTask(number, str(path)))
+        box, up = await self._coordinator.ask(lambda number: LookTask(number, str(path)))
         point, height = await self._seen(None, None)
-        edit = build_paste(
-            str(path), path.stem[:100], np.array(box), np.array(up), point, np.array(own_up), height
-        )
+        own_up = np.array(self._coordinator.up)
+        edit = build_paste(str(path), path.stem[:100], np.array(box), np.array(up), point, own_up, height)
         self._session.paste(edit)
         self._coordinator.changed()
 
@@ -336,9 +333,11 @@ class MessageHandlers:
         self._session.preserve_opacity(message.preserve_opacity)
         self._coordinator.changed()
 
-    @_handles(client_messages.ScaleChange)
-    def _scale_change(self, message: client_messages.ScaleChange) -> None:
-        self._session.set_scale(message.meters_per_unit)
+    @_handles(alignment_messages.ScaleChange)
+    @_handles(alignment_messages.UpChange)
+    @_handles(alignment_messages.AlignPaste)
+    async def _change_alignment(self, message: alignment_messages.AlignmentMessage) -> None:
+        await change_alignment(self._coordinator, self._page, message)
         self._coordinator.changed()
 
     @_handles(hotspot_messages.PutHotspot)
@@ -403,7 +402,8 @@ class MessageHandlers:
         self._coordinator.pump()
 
     @_handles(client_messages.ExportSplats)
-    def _export(self, message: client_messages.ExportSplats) -> None:
+    @_handles(client_messages.ExportPage)
+    def _export(self, message: client_messages.ExportSplats | client_messages.ExportPage) -> None:
         self._coordinator.background.export(self._page.number, message)
 
     @_handles(client_messages.CancelJob)
