@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -78,14 +77,16 @@ def test_up_by_points_a_paste_by_pairs_and_a_page(folder: Path, tmp_path: Path) 
         # A page of the document as it is, unsaved.
         page.click("button.download")
         page.select_option("dialog[open] select[name=form]", "levels")
-        page.fill("dialog[open] input[name=budget]", "300")
+        assert page.is_visible("dialog[open] input[name=budget]")
+        assert not page.is_visible("dialog[open] input[name=splats]")
+        page.click("dialog[open] button.primary")
+        editor.said("it needs no levels of detail")
+        page.click("button.download")
+        page.select_option("dialog[open] select[name=form]", "page")
         with page.expect_download() as download:
             page.click("dialog[open] button.primary")
-        file = tmp_path / "page.zip"
-        download.value.save_as(file)
-        with zipfile.ZipFile(file) as archive:
-            index = archive.read("ball/index.html").decode()
-            assert any(name.startswith("ball/scene.node") for name in archive.namelist())
-        assert f'"up": [{up[0]}' in index
+        assert download.value.suggested_filename == "ball.html"
+        download.value.save_as(tmp_path / "page.html")
+        assert f'"up": [{up[0]}' in (tmp_path / "page.html").read_text()
         editor.changed(lambda: editor.press("Control+s"))
     np.testing.assert_allclose(Scene.open(folder).up, up)

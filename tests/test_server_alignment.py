@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
+import functools
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +19,7 @@ from cagefield.edits import EditStack, MoveCorner, Paste
 from cagefield.errors import CagefieldError, EditError, SceneError
 from cagefield.exporting.similarity import transform_field
 from cagefield.geometry.point_alignment import Similarity
+from cagefield.pages import page_nodes, scene_page
 from cagefield.pages.scene_page import ScenePage
 from cagefield.scene.alignment import Alignment
 from cagefield.scene.scene import Scene
@@ -200,8 +202,12 @@ def test_points_on_a_bent_paste_are_found_by_its_own_map(pasted: Path) -> None:
 
 
 @pytest.mark.parametrize("levels", [False, True])
-def test_a_page_for_download_is_the_exported_one(tmp_path: Path, levels: bool) -> None:
+def test_a_page_for_download_is_the_exported_one(
+    tmp_path: Path, levels: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Of the document's up direction and scale, not of the folder's."""
+    small = functools.partial(page_nodes.encode_page_nodes, coarse=100, node=60)
+    monkeypatch.setattr(scene_page, "encode_page_nodes", small)
     cameras = {"test": turntable((0, 0, 0), 3.0, 2, elevation=0.3, width=64, height=48, fov_x=0.8)}
     scene = dataclasses.replace(splat_scene(), cameras=cameras, edits=EditStack())
     scene.save(tmp_path / "scene")

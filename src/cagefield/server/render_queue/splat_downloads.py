@@ -15,6 +15,7 @@ from cagefield.errors import CagefieldError
 from cagefield.exporting.path_frames import CameraPath
 from cagefield.fields.splat_field import SplatField
 from cagefield.files.temporary_folders import TemporaryFolder
+from cagefield.pages.page_nodes import COARSE_SPLATS
 from cagefield.scene.alignment import Alignment
 from cagefield.server.editor.document import Entry
 from cagefield.server.editor.persistence import SceneStore, stem_of
@@ -69,8 +70,8 @@ class Exports:
         has_splats = isinstance(self._store.scene.field, SplatField)
         content: EditedSplats | EditedPage
         if isinstance(message, client_messages.ExportPage):
-            if message.levels and not has_splats:
-                raise CagefieldError("the scene holds voxels, whose pages have levels already; choose a page")
+            if message.levels:
+                self._check_levels()
             content = self._page(message)
         elif has_splats:
             content = self._splats(message)
@@ -119,6 +120,17 @@ class Exports:
     def _path(self, export: _Export) -> Path:
         assert self._folder is not None  # made when the first export begins
         return self._folder.path / str(export.number) / export.name
+
+    def _check_levels(self) -> None:
+        """Raises CagefieldError for a scene whose page has no levels of detail as files."""
+        field = self._store.scene.field
+        if not isinstance(field, SplatField):
+            raise CagefieldError("the scene holds voxels, whose pages have levels already; choose a page")
+        if len(field) <= COARSE_SPLATS:
+            raise CagefieldError(
+                f"the scene has {len(field)} splats, no more than a coarse level: it needs no levels of "
+                "detail; choose a page without"
+            )
 
     def _splats(self, message: client_messages.ExportSplats) -> EditedSplats:
         """Content of a file of splats: the edits as they are now, numbered from 1 along the path."""
