@@ -7,7 +7,7 @@ the time within the segments beside it is eased, so that the velocity goes to ze
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -54,7 +54,7 @@ class PoseSpline:
                 poses[rows, :3, :3], poses[rows, :3, 3] = rotations(at).as_matrix(), eyes(at)
         return poses
 
-    def _spline(self, span: _Span, is_periodic: bool) -> tuple[object, RotationSpline]:
+    def _spline(self, span: _Span, is_periodic: bool) -> tuple[Callable[[Floats], Floats], RotationSpline]:
         """(spline of the eye, rotation spline) of a span."""
         from scipy.interpolate import CubicSpline
 
