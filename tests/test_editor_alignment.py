@@ -31,7 +31,7 @@ def folder(tmp_path: Path) -> Path:
     scene.save(tmp_path / "ball")
     dataclasses.replace(scene, cameras={}).save(tmp_path / "other")
     paste = Scene.open(tmp_path / "ball").paste("../other", name="other")
-    paste = paste.replace(operations=()).translate(tuple(SHIFT))
+    paste = paste.replace(operations=(), fill="none", relight="none").translate(tuple(SHIFT))
     Scene.open(tmp_path / "ball").with_edits(EditStack([paste])).save(tmp_path / "ball", overwrite=True)
     return tmp_path / "ball"
 
