@@ -42,7 +42,7 @@ MATCHED_QUANTILE = 0.7
 
 REACH_RESIDUALS, REACH_SHARE = 4.0, 0.03
 """Maximum distance between surfaces of both scenes that are held for one, after the pairs: so many times the
-pairs' distance, and at least a share of the diagonal of what is pasted."""
+pairs' distance, and at least a share of the diagonal of the pasted content."""
 
 _DECIMALS = 9
 """Decimals of operations, as a person would read them."""

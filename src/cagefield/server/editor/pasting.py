@@ -60,7 +60,7 @@ def crop_paste(edit: Paste, cage: Cage) -> Paste:
 def source_points(edit: Paste, points: Array) -> Array:
     """Points [N,3] of the other scene that stand at points [N,3] of this one, where no parent carries them.
 
-    Raises EditError for a point beside what is pasted.
+    Raises EditError for a point beside the pasted content.
     """
     size = float(np.ptp(edit.deformed.corners, axis=0).max())
     inside = edit.deformed.grown(PICK_MARGIN_SHARE * size).contains(points)

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from cagefield.server.protocol.common import EditId, Message, Vec3
 
-MAX_PAIRS = 20
+MAX_POINT_PAIRS = 20
 """Maximum number of pairs of points of a paste's alignment."""
 
 
@@ -47,7 +47,7 @@ class AlignPaste(Message):
 
     type: Literal["align_paste"] = "align_paste"
     edit: EditId
-    pairs: Annotated[list[PointPair], Field(min_length=3, max_length=MAX_PAIRS)]
+    pairs: Annotated[list[PointPair], Field(min_length=3, max_length=MAX_POINT_PAIRS)]
     refine: bool = False
     keep_scale: bool = False
     match_colors: bool = False
