@@ -83,7 +83,7 @@ def test_up_by_points_a_paste_by_pairs_and_a_page(folder: Path, tmp_path: Path) 
         editor.said("it needs no levels of detail")
         page.click("button.download")
         page.select_option("dialog[open] select[name=form]", "page")
-        with page.expect_download() as download:
+        with page.expect_download(timeout=240_000) as download:
             page.click("dialog[open] button.primary")
         assert download.value.suggested_filename == "ball.html"
         download.value.save_as(tmp_path / "page.html")
