@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import time
+import types
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -27,7 +28,7 @@ folder = Path(sys.argv[1])
 report: dict[str, object] = {"version": bpy.app.version_string}
 bpy.ops.wm.read_factory_settings(use_empty=True)
 assert addon_utils.enable(MODULE, default_set=True) is not None
-from blender import live, session, splat_nodes, splat_objects, worker
+from blender import live, panel, session, splat_nodes, splat_objects, worker
 
 worker.START_TIMEOUT_S = TIMEOUT_S
 addon = bpy.context.preferences.addons[MODULE]
@@ -259,6 +260,65 @@ bpy.ops.cagefield.update()
 report["the result has ellipsoids"] = splat_nodes.shows_ellipsoids(settings().result)
 bpy.ops.cagefield.reset()
 bpy.ops.cagefield.show_ellipsoids(shown=False)
+
+
+# ---- the panel: every operator and property that it shows exists ----
+class Layout:
+    """A layout that looks up what it is asked to show."""
+
+    def __init__(self):
+        self.shown = []
+        self.lines = []
+
+    def column(self, **_):
+        return self
+
+    row = column
+
+    def operator(self, name, **_):
+        group, operator = name.split(".")
+        self.shown.append(getattr(getattr(bpy.ops, group), operator).get_rna_type().identifier)
+        return types.SimpleNamespace()
+
+    def prop(self, data, name, **_):
+        self.shown.append(data.bl_rna.properties[name].identifier)
+
+    def label(self, text):
+        self.lines.append(text)
+
+
+settings().status = "a line of words that is longer than the panel is wide, and is wrapped"
+layout = Layout()
+panel.CagefieldPanel.draw(types.SimpleNamespace(layout=layout), bpy.context)
+report["panel"] = layout.shown
+report["panel lines"] = layout.lines
+
+# ---- a cage that moves while answers come ----
+settings().live = True
+follow_until(lambda: settings().result is not None and not session.get_worker().is_busy)
+process, shapes = session.get_worker(), []
+for _ in range(4):
+    settings().inner.location.x += 0.02
+    refresh()
+    live.tick()
+    follow_until(lambda: not process.is_busy)
+    shapes.append((process._number, splat_objects.read_splats(settings().result)["means"].copy()))
+report["moves sent"] = [number for number, _ in shapes]
+report["every answer is shown"] = all(not np.array_equal(shapes[k][1], shapes[k + 1][1]) for k in range(3))
+
+# ---- a file that is saved and opened while it is live ----
+bpy.ops.wm.save_as_mainfile(filepath=str(folder / "live.blend"))
+bpy.ops.wm.open_mainfile(filepath=str(folder / "live.blend"))
+report["live after opening"] = settings().live and bpy.context.scene.name in live._changed
+settings().inner.location.y += 0.03
+refresh()
+follow_until(lambda: not live._changed and not session.get_worker().is_busy)
+save("reopened", settings().result)
+np.savez(
+    folder / "reopened_request.npz",
+    **session.edit_request(settings(), bpy.context.evaluated_depsgraph_get())[1],
+)
+settings().live = False
 
 # ---- the end: the process goes with the add-on ----
 last = session.running()

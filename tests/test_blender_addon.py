@@ -232,6 +232,27 @@ def test_a_scene_is_opened_upright(session: tuple[Path, dict[str, Any]]) -> None
     assert report["the result has ellipsoids"]
 
 
+def test_the_panel_shows_operators_and_properties_that_exist(session: tuple[Path, dict[str, Any]]) -> None:
+    _, report = session
+    assert len(report["panel"]) == len(set(report["panel"])) + 2  # two buttons each of two operators
+    assert {"CAGEFIELD_OT_open", "CAGEFIELD_OT_update", "live", "inner", "outer", "kind"} <= set(
+        report["panel"]
+    )
+    assert len(report["panel lines"]) == 2
+
+
+def test_live_splats_follow_a_cage_that_moves_and_a_file_that_is_opened(
+    session: tuple[Path, dict[str, Any]],
+) -> None:
+    folder, report = session
+    sent = report["moves sent"]
+    assert sent == list(range(sent[0], sent[0] + 4)) and report["every answer is shown"]
+    assert report["live after opening"]
+    edit = edit_of(folder, "reopened_request")
+    np.testing.assert_allclose(edit.deformed.center - edit.inner.center, (0.08, 0.03, 0), atol=1e-6)
+    assert_same(splats_of(folder, "reopened"), edited(splats_of(folder, "opened"), edit))
+
+
 def test_the_zip_file_is_an_extension_that_blender_installs(tmp_path: Path) -> None:
     """Built as the documentation says, installed into a folder of its own."""
     python = bpy_python()

@@ -122,7 +122,7 @@ def test_selections_that_mean_nothing_are_refused() -> None:
 
 def test_the_editors_download_merges_splats_beyond_a_number(tmp_path: Path) -> None:
     folder = saved(splat_scene(), tmp_path / "scene")
-    content = EditedSplats(str(folder), "scene", "ply", (), splats=200)
+    content = EditedSplats(scene=str(folder), name="scene", form="ply", splats=200)
     write_edited(content, str(tmp_path / "x.ply"))
     scene = Scene.open(folder)
     assert isinstance(scene.field, SplatField)
@@ -160,7 +160,9 @@ def test_a_scene_with_z_up_stands_upright_in_files(
     assert "turned upright from z-up; --up y-down keeps the scene's coordinates" in said
     read = read_splats(out)
     # The editor's download is the same file.
-    write_edited(EditedSplats(str(folder), "scene", ending[1:], ()), str(tmp_path / f"page{ending}"))
+    write_edited(
+        EditedSplats(scene=str(folder), name="scene", form=ending[1:]), str(tmp_path / f"page{ending}")
+    )
     assert (tmp_path / f"page{ending}").read_bytes() == out.read_bytes()
     R = np.eye(4)
     R[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # (x, y, z) becomes (x, -z, y)

@@ -11,11 +11,14 @@ import pytest
 
 from cagefield import Cage, Edit, EditStack, Hotspot, Scene
 from cagefield.cameras.camera import Camera
+from cagefield.cameras.keyframes import Keyframe, Timeline, stills
 from cagefield.errors import EditError
 from cagefield.pages.page_hotspots import hotspot_entries
 from cagefield.scene.hotspot_motion import following, shown_hotspots, visible_hotspots
 from cagefield.scene.hotspots import view_of_camera
+from cagefield.server.editor.document import Document
 from cagefield.server.editor.edit_texts import ReadEdits
+from cagefield.server.editor.hotspot_tracks import hotspot_tracks
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol.client_messages import page_messages
@@ -138,3 +141,38 @@ def test_the_editor_carries_them_with_an_edit_and_back_by_undo(tmp_path: Path) -
     # Its title may be written while it is hidden, and it keeps its place.
     say(session, type="put_hotspot", hotspot=1, title="hidden", position=[0.1, 0, 0])
     assert session.document.hotspots[0].hotspot.position == (0.1, 0, 0)
+
+
+def test_the_preview_of_a_path_has_them_where_the_parts_of_the_edits_carry_them() -> None:
+    """A move that is done evenly, a deletion from one half on: closed forms at each moment."""
+    c2w = tuple(np.eye(4).ravel())
+    keys = tuple(
+        Keyframe(tuple(CAMERA.c2w.ravel()) if part else c2w, 40.0, 1.0, {1: part, 2: part})
+        for part in (0.0, 1.0)
+    )
+    edits = (
+        Edit.move(INNER).translate((1, 0, 0)),
+        Edit.delete(Cage.box((0, 2, 0), 0.4)),
+    )
+    hotspots = (
+        SPOT,
+        dataclasses.replace(SPOT, position=(0.0, 2.0, 0.0)),
+        dataclasses.replace(SPOT, follows=False),
+    )
+    document = Document.from_edits(edits, keys=keys, hotspots=hotspots)
+    tracks = hotspot_tracks(document, lambda edit: None)
+    assert sorted(tracks) == [1, 2] and {len(track) for track in tracks.values()} == {13}
+    parts = Timeline(keys, loop=False).parts(np.linspace(0.0, 1.0, 13))
+    np.testing.assert_allclose(np.array(tracks[1])[:, 0], 0.1 + parts[1], atol=1e-9)
+    assert [place is None for place in tracks[2]] == (parts[2] >= 0.5).tolist()
+    still = Document.from_edits(edits, keys=tuple(dataclasses.replace(k, parts={}) for k in keys))
+    assert hotspot_tracks(dataclasses.replace(still, hotspots=document.hotspots), lambda edit: None) == {}
+
+
+def test_a_page_never_marks_on_its_path_what_the_whole_edits_hide() -> None:
+    scene = dataclasses.replace(ball_scene(), hotspots=(SPOT,)).with_edits(EditStack([Edit.delete(INNER)]))
+    pictures = stills(
+        [Keyframe(tuple(CAMERA.c2w.ravel()), 40.0, 1.0, {1: part}) for part in (0.0, 1.0)],
+        loop=False, fps=4, width=100, height=100,
+    )  # fmt: skip
+    assert hotspot_entries(scene, pictures) == []

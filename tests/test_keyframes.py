@@ -49,6 +49,31 @@ def test_turning_is_even_between_two_keys() -> None:
     np.testing.assert_allclose(angles, [0, 20, 40, 60, 80], atol=1e-6)
 
 
+@pytest.mark.parametrize("loop", [False, True])
+def test_the_camera_rests_between_two_keys_of_one_pose_and_eases_to_it(loop: bool) -> None:
+    keys = [key(0.0), key(1.0, 30), key(1.0, 30, seconds=2.0), key(3.0, 80), key(4.0, 200)]
+    line = Timeline(keys, loop=loop)
+    times = np.linspace(0.0, line.seconds, round(line.seconds * 200) + 1)
+    poses = line.poses(times)
+    rest = (times >= 1.0) & (times <= 2.0)
+    np.testing.assert_array_equal(poses[rest], np.broadcast_to(keys[1].pose, (rest.sum(), 4, 4)))
+    at = np.cumsum([0.0] + [k.seconds for k in keys[:-1]])
+    np.testing.assert_allclose(line.poses(at), [k.pose for k in keys], atol=1e-9)
+    if loop:
+        np.testing.assert_allclose(line.poses(np.array([line.seconds]))[0], keys[0].pose, atol=1e-9)
+        poses = np.concatenate([poses, poses[1:3]])
+    # No corner anywhere: second differences of a path with one would be of its speed, over 200.
+    flat = poses[:, :3].reshape(len(poses), -1)
+    assert np.abs(np.diff(flat, 2, axis=0)).max() < 30.0 / 200.0**2
+
+
+def test_a_still_camera_stays_exactly_where_it_is() -> None:
+    keys = [key(0.3, 20, e1=part) for part in (0.0, 1.0, 0.5)]
+    for loop in (False, True):
+        poses = Timeline(keys, loop=loop).poses(np.linspace(0.0, 2.0, 21))
+        np.testing.assert_array_equal(poses, np.broadcast_to(keys[0].pose, (21, 4, 4)))
+
+
 def test_parts_of_edits_are_blended_and_never_leave_their_keys() -> None:
     keys = [key(0, e1=0.0), key(0, e1=0.0), key(0, e1=1.0), key(0, e1=1.0)]
     parts = [still.parts[1] for still in stills(keys, loop=False, fps=20.0, width=8, height=8)]

@@ -91,6 +91,29 @@ def test_surfaces_correct_rough_pairs(unit: float) -> None:
     assert same.scale == metric.scale and corner_error(same, to_unit) < 0.02 * unit
 
 
+@pytest.mark.parametrize("keep_scale", [False, True])
+def test_a_source_of_which_little_has_a_counterpart_is_not_shrunk_onto_it(keep_scale: bool) -> None:
+    """A fifth of the surface is in the target: without a reach, the rest would draw the source together."""
+    source, target = bumpy_surface(6000, 0), bumpy_surface(20_000, 5)
+    target = TRUE.transform_points(target[target[:, 0] > 0.45])
+    rough = Similarity(
+        TRUE.scale if keep_scale else 1.03 * TRUE.scale,
+        Rotation.from_euler("xyz", (2.0, -2.0, 1.5), degrees=True).as_matrix() @ TURN,
+        TRUE.translation + np.array([0.04, -0.03, 0.05]),
+    )
+    found = refine_similarity(source, target, rough, keep_scale=keep_scale, reach=0.25)
+    near = source[source[:, 0] > 0.5]
+    error, before = (
+        np.linalg.norm(each.transform_points(near) - TRUE.transform_points(near), axis=1).mean()
+        for each in (found.similarity, rough)
+    )
+    assert error < 0.5 * before
+    anyhow = refine_similarity(source, target, rough)
+    assert 1 / 1.25 < anyhow.similarity.scale / rough.scale < 1.25
+    with pytest.raises(CagefieldError, match="none of the surfaces side by side"):
+        refine_similarity(source, target + 50.0, rough, reach=0.25)
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A scene of splats, and beside it `other`, the same splats under the inverse of TRUE."""

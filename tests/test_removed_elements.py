@@ -118,7 +118,8 @@ def test_pictures_picks_and_downloads_are_of_what_is_left(scene: Path, tmp_path:
         np.testing.assert_array_equal(found, expected)
     assert not np.allclose(renderers.still(Shown(()), CAMERA, Display()).rgb, found, atol=0.1)
     write_edited(
-        EditedSplats(str(scene), "scene", "ply", (), removed=ball), str(tmp_path / "out" / "rest.ply")
+        EditedSplats(scene=str(scene), name="scene", form="ply", removed=ball),
+        str(tmp_path / "out" / "rest.ply"),
     )
     assert len(read_splats(tmp_path / "out" / "rest.ply")) == ball.total - ball.count
 

@@ -4,6 +4,7 @@
     python docs/how-to/pictures.py frames SCENE        # the dialog, and four frames of the exported USD
     python docs/how-to/pictures.py measure SCENE       # two points measured in the editor
     python docs/how-to/pictures.py decimated SCENE     # all splats, a quarter and a sixteenth
+    python docs/how-to/pictures.py aligned SCENE       # a paste before and after its alignment
 
 SCENE is `biker.compressed.ply` of PlayCanvas' examples, imported; it is copied first and left as it is.
 """
@@ -22,18 +23,24 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 
 import numpy as np
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
-from cagefield import Camera, EditStack, Hotspot, Scene, load_edits
+from cagefield import Cage, Camera, Edit, EditStack, Hotspot, Scene, load_edits
 from cagefield.cameras.keyframes import Keyframe
+from cagefield.edits.grade import Grade, grade_sh
+from cagefield.exporting import edited_splats
 from cagefield.exporting.path_frames import CameraPath
+from cagefield.exporting.similarity import transform_field
 from cagefield.exporting.usd_scenes import StageScene, write_scenes_usd
 from cagefield.fields.splat_decimation import decimate_splats
 from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats.splat_files import read_splats
+from cagefield.geometry.point_alignment import Similarity
 from cagefield.images.metrics import psnr
 from cagefield.pages.scene_page import ScenePage
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.scene.hotspots import view_of_camera
+from cagefield.scene.paste_alignment import align_paste, placed
 from chromium import chromium_context
 from editor_page import EditorPage, editor_page
 from editor_server import editor_server
@@ -49,7 +56,8 @@ PAGE_SPLATS = 50_000
 def main() -> None:
     """Runs a session."""
     name, path = sys.argv[1:]
-    session = {"hotspots": hotspots, "frames": frames, "measure": measure, "decimated": decimated}[name]
+    sessions = (hotspots, frames, measure, decimated, aligned)
+    session = {one.__name__: one for one in sessions}[name]
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / "biker"
         shutil.copytree(path, scene)
@@ -134,6 +142,47 @@ def decimated(scene: Scene, folder: Path) -> None:
         print(f"{len(fewer)} splats" + (f", {psnr(frame.rgb, whole):.1f} dB" if share > 1 else ""))
         pictures.append(Image.fromarray(frame.rgb8()))
     beside(pictures).save(HERE / "decimated.jpg", quality=85)
+
+
+def aligned(scene: Scene, folder: Path) -> None:
+    """The upper half of a darker capture in other units, pasted somewhere, and aligned by rough pairs."""
+    field, first = scene.field, scene.first_camera
+    assert isinstance(field, SplatField)
+    away = (first.origin - first.origin.mean()) * (1, 0, 1)
+    eye = np.array([0.3, -1.7, 0.0]) + 6.5 * away / np.linalg.norm(away)
+    camera = Camera.look_at(eye, (0.3, -1.7, 0.0), scene.up, width=420, height=480, fov_x=0.62)
+    other = Similarity(
+        0.7, Rotation.from_euler("xyz", (9, 35, -6), degrees=True).as_matrix(), np.array([2, 1, 0])
+    )
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = other.scale * other.rotation, other.translation
+    darker = np.broadcast_to(Grade(exposure=-0.9, temperature=-0.4).matrix, (len(field), 3, 3))
+    moved = transform_field(dataclasses.replace(field, sh=grade_sh(field.sh, darker), bounds=None), matrix)
+    dataclasses.replace(scene, field=moved, cameras={}).save(folder / "other")
+    # The file's y points down; both halves have the belt.
+    is_lower = (field.means[:, 1] > -1.2) & (field.scales.max(axis=1) < 0.1)
+    lower = dataclasses.replace(scene, field=field.take(np.flatnonzero(is_lower)), folder=folder / "biker")
+    is_upper = field.means[:, 1] < -1.0
+    inner = Cage.box(*_center_and_size(moved.means[is_upper]))
+    belt = field.means[is_lower & is_upper].astype(float)
+    goals = belt[[*belt[:, ::2].argmin(axis=0), *belt[:, ::2].argmax(axis=0)]]
+    noise = np.random.default_rng(0).normal(0.0, 0.03, goals.shape)
+    back = Similarity(1.1, np.eye(3), np.array([-1.6, -2.0, 0.3]))
+    before = placed(Edit.paste("../other", inner, name="upper"), back)
+    after = align_paste(
+        lower, before, other.transform_points(goals), goals + noise, refine=True, match_colors=True
+    )
+    print(after.residual, after.refinement, after.edit.operations, after.edit.grading)
+    pictures = [
+        drawn(edited_splats(lower.with_edits(EditStack([edit]))), camera) for edit in (before, after.edit)
+    ]
+    beside(pictures).save(HERE / "aligned.jpg", quality=85)
+
+
+def _center_and_size(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Center [3] and size [3] of the box of points [N,3], without the outermost of them."""
+    low, high = np.quantile(points, [0.002, 0.998], axis=0)
+    return 0.5 * (low + high), high - low
 
 
 def near(scene: Scene, width: int, height: int) -> Camera:

@@ -51,6 +51,7 @@ export function state(change: Partial<State> = {}): State {
     is_file: false,
     preserve_opacity: false,
     meters_per_unit: null,
+    up: null,
     keys: [],
     loop: false,
     hotspots: [],

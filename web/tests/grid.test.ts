@@ -25,6 +25,7 @@ function answer(grid: Vec3[][]): Answer {
     grid,
     stills: [],
     sources: [],
+    tracks: [],
     histogram: null,
     failed: false,
   };

@@ -3,7 +3,7 @@ import { Matrix4, Quaternion, Vector3 } from "three";
 import { pathDuration, stillAt } from "../src/app/camera_path";
 import { Player, type Playable } from "../src/app/player";
 import { Store } from "../src/app/store";
-import type { Answer, Hello, Key, PageMessage, Still } from "../src/net/protocol";
+import type { Answer, Hello, Key, PageMessage, Still, Vec3 } from "../src/net/protocol";
 import { expectClose } from "./cages";
 import { state } from "./fake_server";
 
@@ -51,7 +51,7 @@ class FakePage implements Playable {
   readonly changes: boolean[] = [];
   settled = 0;
   time = 1000;
-  answer: Partial<Answer> | null = { stills: STILLS };
+  answer: Partial<Answer> | null = { stills: STILLS, tracks: [] };
   readonly viewport = {
     beforeFrame: [] as (() => void)[],
     userTurns: [] as (() => void)[],
@@ -108,6 +108,23 @@ describe("the player", () => {
     expect([page.changes, page.settled, page.player.playing]).toEqual([[true, false], 1, false]);
     page.frame(1);
     expect(page.poses).toHaveLength(3);
+  });
+
+  it("has hotspots where the edits carry them in the frame that it plays", async () => {
+    const page = new FakePage();
+    const still = { id: 1, position: [7, 7, 7] as Vec3, hidden: false };
+    const carried = { id: 2, position: [4, 0, 0] as Vec3, hidden: true };
+    page.answer = { stills: STILLS, tracks: [{ hotspot: 2, places: [[0, 0, 0], [2, 0, 0], null] }] };
+    expect(page.player.placeOf(still)).toBeNull();
+    await page.begin();
+    page.frame(0);
+    expect(page.player.placeOf(carried)).toEqual([0, 0, 0]);
+    page.frame(0.5); // a quarter of the path
+    expect(page.player.placeOf(carried)).toEqual([1, 0, 0]);
+    expect(page.player.placeOf(still)).toEqual([7, 7, 7]);
+    expect(page.player.placeOf({ ...still, hidden: true })).toBeNull();
+    page.frame(0.75);
+    expect(page.player.placeOf(carried)).toBeNull();
   });
 
   it("goes round in a loop until it is stopped", async () => {

@@ -1,8 +1,8 @@
 """Keyframed camera paths: cameras with a time between them, and the completed part of each edit at each.
 
-Between keys the eye follows a natural cubic spline, the direction a rotation spline, and the field of view
-and the edits' parts monotone cubics, which never leave the range of the neighboring keys. A loop continues
-from the last key to the first one, smoothly.
+Between keys the camera follows a smooth spline, or rests where both have one pose (`pose_splines`); the field
+of view and the edits' parts follow monotone cubics, which never leave the range of the neighboring keys. A
+loop continues from the last key to the first one, smoothly.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation, RotationSpline
 
 from cagefield.cameras.camera import Camera
+from cagefield.cameras.pose_splines import PoseSpline
 from cagefield.errors import CameraError
 
 Floats = npt.NDArray[np.float64]
@@ -95,16 +95,14 @@ class Timeline:
 
     def __init__(self, keys: Sequence[Keyframe], *, loop: bool) -> None:
         """Splines through the keys. Raises CameraError for fewer than two keys."""
-        from scipy.interpolate import CubicSpline, PchipInterpolator
+        from scipy.interpolate import PchipInterpolator
 
         if len(keys) < 2:
             raise CameraError(f"a camera path with {len(keys)} keyframes does not move; record at least two")
         ring = [*keys, keys[0]] if loop else list(keys)
         times = np.concatenate([[0.0], np.cumsum([key.seconds for key in ring[:-1]])])
         self.seconds = float(times[-1])
-        ends = "periodic" if loop else "natural"
-        self._eyes = CubicSpline(times, [key.pose[:3, 3] for key in ring], bc_type=ends)
-        self._rotation_spline = _rotation_spline([key.pose[:3, :3] for key in ring], times, loop)
+        self._poses = PoseSpline([key.pose for key in ring], times, loop=loop)
         self._fovs = PchipInterpolator(times, [key.fov_y_deg for key in ring])
         self._parts = {
             name: PchipInterpolator(times, [key.parts.get(name, 1.0) for key in ring])
@@ -113,9 +111,7 @@ class Timeline:
 
     def poses(self, times: Floats) -> Floats:
         """Matrices c2w [N,4,4] at times [N]."""
-        poses = np.tile(np.eye(4), (len(times), 1, 1))
-        poses[:, :3, :3], poses[:, :3, 3] = self._rotation_spline(times).as_matrix(), self._eyes(times)
-        return poses
+        return self._poses(np.asarray(times, np.float64))
 
     def fovs_y_deg(self, times: Floats) -> Floats:
         """Vertical fields of view [N] at times [N]."""
@@ -151,17 +147,6 @@ def stills(keys: Sequence[Keyframe], *, loop: bool, fps: float, width: int, heig
             height,
         )
         for n in range(count)
-    )
-
-
-def _rotation_spline(matrices: list[Floats], times: Floats, loop: bool) -> RotationSpline:
-    """Rotation spline; a loop is passed three times, so that its seam is as smooth as the rest."""
-    if not loop:
-        return RotationSpline(times, Rotation.from_matrix(np.stack(matrices)))
-    one_turn, period = np.stack(matrices[:-1]), times[-1]
-    times_around = np.concatenate([times[:-1] - period, times[:-1], times[:-1] + period, [2.0 * period]])
-    return RotationSpline(
-        times_around, Rotation.from_matrix(np.concatenate([one_turn, one_turn, one_turn, one_turn[:1]]))
     )
 
 

@@ -44,6 +44,7 @@ def _keep_no_launch(*_: object) -> None:
 
 LaunchContextBufferCache.cache = _keep_no_launch  # type: ignore[method-assign, unused-ignore]
 
+
 def _is_no_method(level_of_class_stackframe: int) -> bool:
     """Stands for `kernel_impl._inside_class`; see above."""
     return False

@@ -37,6 +37,10 @@ MAX_ICP_ROUNDS = 60
 TRIMMED_QUANTILE = 0.7
 """Share of the source points, the nearest to their matches, that a round fits."""
 
+MAX_SCALE_CHANGE = 1.25
+"""Maximum factor by which a refinement enlarges or shrinks the source: one that shrinks to a point on the
+target's surface would be near it, too."""
+
 CONVERGED_SHARE = 1e-5
 """Motion of the points in a round, as a share of their extent, below which the rounds end."""
 
@@ -99,21 +103,31 @@ def refine_similarity(
     start: Similarity,
     *,
     keep_scale: bool = False,
+    reach: float | None = None,
     seed: int = 0,
 ) -> RefinedSimilarity:
     """Similarity that brings source points [N,3] nearer to the surface of target points [M,3] than `start`.
 
     Trimmed iterative closest points: each round matches source points to their nearest target points, and
-    fits the distances of the nearest TRIMMED_QUANTILE to the planes of their matches. `start` itself where
-    nothing comes nearer.
+    fits the distances of the nearest TRIMMED_QUANTILE to the planes of their matches. Source points that
+    `start` leaves beyond a distance `reach` from the target have no counterpart and do not count, if given.
+    `start` itself where nothing comes nearer.
 
     Raises:
-        CagefieldError: fewer than PLANE_NEIGHBORS points in either set.
+        CagefieldError: fewer than PLANE_NEIGHBORS points that count in either set.
     """
-    points, goal = _sample(source, MAX_SOURCE_POINTS, seed), _sample(target, MAX_TARGET_POINTS, seed)
-    if min(len(points), len(goal)) < PLANE_NEIGHBORS:
+    goal = _sample(target, MAX_TARGET_POINTS, seed)
+    if min(len(source), len(goal)) < PLANE_NEIGHBORS:
         raise CagefieldError(f"a refinement takes at least {PLANE_NEIGHBORS} points on both sides")
-    tree = cKDTree(goal)
+    tree, points = cKDTree(goal), np.asarray(source, np.float64)
+    if reach is not None:
+        points = points[tree.query(start.transform_points(points), workers=-1)[0] <= reach]
+        if len(points) < PLANE_NEIGHBORS:
+            raise CagefieldError(
+                "the pairs bring none of the surfaces side by side; choose better ones, or align by the "
+                "pairs alone"
+            )
+    points = _sample(points, MAX_SOURCE_POINTS, seed)
     count = max(PLANE_NEIGHBORS, int(TRIMMED_QUANTILE * len(points)))
 
     def match(similarity: Similarity) -> tuple[Array, Array, Array]:
@@ -133,6 +147,8 @@ def refine_similarity(
             step.rotation @ found.rotation,
             step.transform_points(found.translation),
         )
+        if not 1.0 / MAX_SCALE_CHANGE < found.scale / start.scale < MAX_SCALE_CHANGE:
+            break
         distance, moved, matched = match(found)
         if (median := float(np.median(distance))) < least:
             best, least = found, median

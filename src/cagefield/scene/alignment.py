@@ -43,8 +43,15 @@ MIN_PLANE_SHARE = 0.05
 REFINEMENTS = 3
 """Number of rounds of a plane's refinement."""
 
+MAX_UNIT_ERROR = 1e-12
+"""Maximum difference from 1 of the length of a direction that stays as it is."""
+
 MIN_SINE = 1e-6
 """Minimum sine of the angle between two edges of three points that make a plane."""
+
+
+Direction = tuple[float, float, float]
+"""A unit vector as a value that can be compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +78,14 @@ class Alignment:
         return self.meters_per_unit is not None or self.up is not None
 
     @property
+    def direction(self) -> Direction | None:
+        """The up direction as a value, None where unknown."""
+        if self.up is None:
+            return None
+        x, y, z = self.up.tolist()
+        return x, y, z
+
+    @property
     def matrix(self) -> Array:
         """Similarity [4,4] from the scene's coordinates to aligned ones."""
         matrix = np.eye(4)
@@ -86,6 +101,11 @@ class Alignment:
             "up": None if self.up is None else self.up.tolist(),
         }
         return {key: value for key, value in values.items() if value is not None}
+
+    @classmethod
+    def from_direction(cls, meters_per_unit: float | None, up: Direction | None) -> Alignment:
+        """Alignment with an up direction that is a value, None where unknown."""
+        return cls(meters_per_unit, None if up is None else np.array(up))
 
     @classmethod
     def from_value(cls, value: Any) -> Alignment:
@@ -192,7 +212,8 @@ def _direction(values: Any) -> Array:
         direction = np.empty(0)
     if direction.shape != (3,) or not np.isfinite(direction).all() or not np.abs(direction).max() > 0.0:
         raise SceneError(f"up is {values!r:.60}; it must be 3 finite numbers that are not all 0")
-    direction /= np.abs(direction).max()
-    direction /= np.linalg.norm(direction)
+    if not abs(np.linalg.norm(direction) - 1.0) < MAX_UNIT_ERROR:
+        direction /= np.abs(direction).max()
+        direction /= np.linalg.norm(direction)
     direction.setflags(write=False)
     return direction

@@ -40,6 +40,10 @@ MAX_MATCHED_ELEMENTS = 20_000
 MATCHED_QUANTILE = 0.7
 """Share of the elements, the nearest to those of the scene, whose colors are compared."""
 
+REACH_RESIDUALS, REACH_SHARE = 4.0, 0.03
+"""Maximum distance between surfaces of both scenes that are held for one, after the pairs: so many times the
+pairs' distance, and at least a share of the diagonal of the pasted content."""
+
 _DECIMALS = 9
 """Decimals of operations, as a person would read them."""
 
@@ -71,7 +75,8 @@ def align_paste(
     Its operations are replaced by a scaling, a rotation and a translation. `refine` then brings the surfaces
     of the pasted cage's content nearer to those of this scene (`refine_similarity`); `keep_scale` leaves the
     pairs' scale in that. `match_colors` replaces the edit's grade by the exposure and white balance of the
-    median ratio of colors between elements of this scene and those of the other that come beside them.
+    median ratio of colors between elements of this scene and those of the other that come beside them. Of
+    both scenes only surfaces that the pairs bring side by side count.
 
     Raises:
         CagefieldError: fewer than three pairs, points on a line, or a source that cannot be read.
@@ -83,13 +88,15 @@ def align_paste(
     refinement = None
     if source is not None:
         theirs, ours = _surface(source, edit), _surface(scene.field)
+        extent = float(np.linalg.norm(np.ptp(similarity.transform_points(theirs.positions), axis=0)))
+        reach = max(REACH_RESIDUALS * residual, REACH_SHARE * extent)
         if refine:
             refinement = refine_similarity(
-                theirs.positions, ours.positions, similarity, keep_scale=keep_scale
+                theirs.positions, ours.positions, similarity, keep_scale=keep_scale, reach=reach
             )
             similarity = refinement.similarity
         if match_colors:
-            edit = edit.replace(grading=Grade.from_gains(_gains(theirs, ours, similarity)))
+            edit = edit.replace(grading=Grade.from_gains(_gains(theirs, ours, similarity, reach)))
     return AlignedPaste(placed(edit, similarity), residual, refinement)
 
 
@@ -128,13 +135,21 @@ def _surface(field: VoxelField | SplatField, edit: Paste | None = None) -> _Surf
     )
 
 
-def _gains(theirs: _Surface, ours: _Surface, similarity: Similarity, *, seed: int = 0) -> Array:
-    """Median ratios [3] of our colors to theirs, of elements that a similarity brings side by side."""
-    rows = np.arange(len(theirs.positions))
+def _gains(theirs: _Surface, ours: _Surface, similarity: Similarity, reach: float, *, seed: int = 0) -> Array:
+    """Median ratios [3] of our colors to theirs, of elements that a similarity brings side by side.
+
+    Raises CagefieldError where none comes within `reach` of ours.
+    """
+    tree = cKDTree(ours.positions)
+    distance, nearest = tree.query(similarity.transform_points(theirs.positions), workers=-1)
+    rows = np.flatnonzero(distance <= reach)
+    if len(rows) == 0:
+        raise EditError(
+            "the pairs bring none of the surfaces side by side; match no colors, or choose better ones"
+        )
     if len(rows) > MAX_MATCHED_ELEMENTS:
         rows = np.random.default_rng(seed).choice(rows, MAX_MATCHED_ELEMENTS, replace=False)
-    tree = cKDTree(ours.positions)
-    distance, nearest = tree.query(similarity.transform_points(theirs.positions[rows]), workers=-1)
+    distance, nearest = distance[rows], nearest[rows]
     count = max(1, int(MATCHED_QUANTILE * len(rows)))
     near = np.argpartition(distance, count - 1)[:count]
     theirs_rgb, ours_rgb = theirs.rgb[rows[near]], ours.rgb[nearest[near]]

@@ -32,6 +32,7 @@ import type {
   Vec3,
 } from "../net/protocol";
 import { createDrawer } from "../splats/drawer_selection";
+import { isDownload } from "./downloads";
 import { Player } from "./player";
 import { recallCamera, recallTools } from "./session_storage";
 import {
@@ -42,6 +43,8 @@ import {
   selectedEdit,
   showsCages,
   dragTarget,
+  hasPointTool,
+  upOf,
 } from "./store";
 
 /** Values of the store whose change redraws the canvas. */
@@ -56,6 +59,7 @@ const CANVAS_KEYS = [
   "selecting",
   "measured",
   "placesHotspot",
+  "picked",
   "cages",
   "grid",
   "view",
@@ -231,11 +235,7 @@ export class App {
     this.highlight.draw(selection !== null && this.drag === null && now.preview === null && !now.before);
     const hasGizmo = now.tool !== "select" || now.corners.length > 0;
     const isMovable =
-      edit !== null &&
-      dragObstacle(now, edit) === null &&
-      now.selecting === null &&
-      now.measured === null &&
-      !now.placesHotspot;
+      edit !== null && dragObstacle(now, edit) === null && now.selecting === null && !hasPointTool(now);
     if (!isMovable || !showsCages(now) || !hasGizmo) {
       this.gizmo.hide();
       return;
@@ -310,6 +310,7 @@ export class App {
     const now = state.edits.find((edit) => edit.id === state.selected);
     const hasOtherHandles = before?.points?.deformed.length !== now?.points?.deformed.length;
     this.store.set({ state, ...(isOther || hasOtherHandles ? { corners: [], hover: null } : {}) });
+    this.viewport.turnUp(upOf(this.store.now));
     if (isExpected) {
       this.lastEditId = null;
       const hasPoints = selectedEdit(this.store.now)?.cage !== "box";
@@ -328,7 +329,7 @@ export class App {
   /** Shows the progress of a job, and downloads the finished file of a job that this page started. */
   private takeJob(job: Job): void {
     this.store.set({ jobs: [...this.store.now.jobs.filter((other) => other.job !== job.job), job] });
-    if (job.what !== "splats" || job.state !== "done" || job.page !== this.store.now.hello?.page) return;
+    if (!isDownload(job) || job.state !== "done" || job.page !== this.store.now.hello?.page) return;
     const link = document.createElement("a");
     link.href = `exports/${job.job}/${encodeURIComponent(job.out)}${location.search}`;
     link.download = job.out;

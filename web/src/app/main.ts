@@ -4,10 +4,12 @@ import { App } from "./app";
 import { testApi } from "./test_api";
 import { bindings, listenForKeys } from "../editing/keys";
 import { MeasureTool } from "../editing/measure_tool";
+import { PointPicker } from "../editing/point_picker";
 import { Pointer } from "../editing/pointer";
 import { RegionTools } from "../editing/region_tools";
 import { storeSession } from "./session_storage";
 import { READ_ONLY_NOTICE, isReadOnly } from "./store";
+import { alignmentPanel } from "../ui/alignment_panel";
 import { dialogs } from "../ui/dialogs";
 import { h } from "../ui/dom";
 import { editsList } from "../ui/edits_list";
@@ -35,6 +37,11 @@ const pointer = new Pointer(app);
 const measure = new MeasureTool(app, (distance) => questions.scale(distance));
 const hotspots = new Hotspots(app, actions, questions);
 pointer.placeHotspot = (x, y) => hotspots.place(x, y);
+const picker = new PointPicker(app, {
+  plane: (points) => app.send({ type: "up_change", by: "points", points }),
+  pairs: (pairs) => questions.align(pairs),
+});
+pointer.pickPoint = (x, y) => picker.add(x, y);
 pointer.measure = (x, y) => measure.add(x, y);
 const keys = bindings(app, actions, pointer, regions, questions);
 listenForKeys(app, actions, pointer, keys);
@@ -49,10 +56,11 @@ const controls = h(
   historyList(app),
   pathList(app, actions, questions),
   hotspots.panel,
+  alignmentPanel(app, actions),
   jobs(app),
 );
 const panel = h("aside", { class: "panel" }, controls);
-view.append(regions.element, measure.element, hotspots.marks, overlay(app, pointer));
+view.append(regions.element, measure.element, picker.element, hotspots.marks, overlay(app, pointer));
 root.append(
   topbar(app, actions, questions),
   toolbar(app, actions),

@@ -2,8 +2,17 @@
  * Playback of the camera path: the page's camera follows the path, and frames show the edits as the video
  * does.
  */
-import { pathDuration, stillAt } from "./camera_path";
-import type { Ask, Answer, PageMessage, Preview, Still } from "../net/protocol";
+import { pathDuration, stillAt, trackAt } from "./camera_path";
+import type {
+  Ask,
+  Answer,
+  HotspotState,
+  HotspotTrack,
+  PageMessage,
+  Preview,
+  Still,
+  Vec3,
+} from "../net/protocol";
 import type { Store } from "./store";
 
 /** The parts of the editor that the player uses. */
@@ -26,6 +35,10 @@ export interface Playable {
 interface Run {
   play: number;
   stills: Still[];
+  /** Places of the hotspots that the edits carry along, by their number. */
+  tracks: Map<number, HotspotTrack["places"]>;
+  /** Share of the duration of the frame that is shown. */
+  share: number;
   /** Duration of the path in seconds. */
   duration: number;
   loop: boolean;
@@ -73,6 +86,14 @@ export class Player {
     this.changed(false);
   }
 
+  /** Where a hotspot is seen in the frame that this page plays; null where it is hidden, or without a playback. */
+  placeOf(hotspot: Pick<HotspotState, "id" | "position" | "hidden">): Vec3 | null {
+    if (this.run === null) return null;
+    const places = this.run.tracks.get(hotspot.id);
+    if (places === undefined) return hotspot.hidden ? null : hotspot.position;
+    return trackAt(places, this.run.share);
+  }
+
   /** Stops the playback if the server has ended its preview. */
   takePreview({ page, play, on }: Preview): void {
     if (!on && page === this.app.store.now.hello?.page && play === this.run?.play) this.stop();
@@ -91,7 +112,15 @@ export class Player {
     }
     this.expected = null;
     const { keys, loop } = state;
-    this.run = { play, stills: answer.stills, duration: pathDuration(keys, loop), loop, started: null };
+    this.run = {
+      play,
+      stills: answer.stills,
+      tracks: new Map(answer.tracks.map(({ hotspot, places }) => [hotspot, places])),
+      share: 0,
+      duration: pathDuration(keys, loop),
+      loop,
+      started: null,
+    };
     this.app.viewport.invalidate();
   }
 
@@ -101,7 +130,8 @@ export class Player {
     run.started ??= this.now();
     const elapsed = (this.now() - run.started) / 1000;
     const seconds = run.loop ? elapsed % run.duration : Math.min(elapsed, run.duration);
-    const { c2w, fov_y_deg } = stillAt(run.stills, seconds / run.duration);
+    run.share = seconds / run.duration;
+    const { c2w, fov_y_deg } = stillAt(run.stills, run.share);
     this.app.send({ type: "play", play: run.play, seconds });
     this.app.viewport.pose(c2w, fov_y_deg);
     if (!run.loop && elapsed >= run.duration) this.stop();

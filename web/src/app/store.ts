@@ -46,6 +46,19 @@ export interface Figures {
   page: boolean;
 }
 
+/** Points of the surface, world space, that a tool collects: of a level plane, or of pairs that align a paste. */
+export interface PickedPoints {
+  purpose: "up" | "paste";
+  points: Vec3[];
+}
+
+/** Values of the store without a tool whose clicks take points of the surface. */
+export const NO_POINT_TOOL: Pick<Editor, "measured" | "placesHotspot" | "picked"> = {
+  measured: null,
+  placesHotspot: false,
+  picked: null,
+};
+
 export interface Editor {
   connection: "connecting" | "open" | "lost";
   hello: Hello | null;
@@ -78,6 +91,8 @@ export interface Editor {
   measured: Vec3[] | null;
   /** Whether a click places a hotspot. */
   placesHotspot: boolean;
+  /** The points that a tool collects; null without such a tool. */
+  picked: PickedPoints | null;
   selectMode: SelectMode;
   /** Radius of the brush, a share of the height of the view. */
   brushRadius: number;
@@ -127,6 +142,7 @@ export const INITIAL: Editor = {
   selecting: null,
   measured: null,
   placesHotspot: false,
+  picked: null,
   selectMode: "replace",
   brushRadius: 0.04,
   through: false,
@@ -194,6 +210,16 @@ export class Store {
 export function selectedEdit(editor: Editor): EditState | null {
   const state = editor.state;
   return state?.edits.find((edit) => edit.id === state.selected) ?? null;
+}
+
+/** Whether clicks take points of the surface. */
+export function hasPointTool(editor: Editor): boolean {
+  return editor.measured !== null || editor.placesHotspot || editor.picked !== null;
+}
+
+/** The direction that is up: the document's, else the cameras'. */
+export function upOf(editor: Editor): Vec3 {
+  return editor.state?.up ?? editor.hello?.up ?? [0, 0, 1];
 }
 
 /** Whether cages are visible: a preview has none, like its video. */

@@ -2,6 +2,7 @@
 import { halfExtent } from "./cage";
 import { targetCage } from "./drag";
 import { middleOf } from "./point_cages";
+import { nextPointText } from "./point_picker";
 import type { App } from "../app/app";
 import type {
   ChangeSelection,
@@ -16,12 +17,16 @@ import type {
 import { isSplatFile, uploadAddress, uploadFile } from "../net/upload";
 import { isFirstUse } from "../app/session_storage";
 import {
+  NO_POINT_TOOL,
   canFill,
   canRelight,
+  hasPointTool,
   selectedEdit,
   dragTarget,
+  upOf,
   type CageName,
   type Editor,
+  type PickedPoints,
   type SelectTool,
   type Tool,
   type View,
@@ -49,7 +54,7 @@ export class Actions {
   ) {}
 
   setTool(tool: Tool): void {
-    this.app.store.set({ tool, selecting: null, measured: null, placesHotspot: false });
+    this.app.store.set({ tool, selecting: null, ...NO_POINT_TOOL });
   }
 
   /** Takes a tool that selects elements, or puts it away. */
@@ -57,8 +62,7 @@ export class Actions {
     const { selecting } = this.app.store.now;
     this.app.store.set({
       selecting: selecting === tool ? null : tool,
-      measured: null,
-      placesHotspot: false,
+      ...NO_POINT_TOOL,
       hover: null,
     });
   }
@@ -67,8 +71,8 @@ export class Actions {
   toggleMeasuring(): void {
     const { measured } = this.app.store.now;
     this.app.store.set({
+      ...NO_POINT_TOOL,
       measured: measured === null ? [] : null,
-      placesHotspot: false,
       selecting: null,
       hover: null,
     });
@@ -77,7 +81,22 @@ export class Actions {
   /** Takes the tool that places hotspots, or puts it away. */
   toggleHotspots(): void {
     const { placesHotspot } = this.app.store.now;
-    this.app.store.set({ placesHotspot: !placesHotspot, measured: null, selecting: null, hover: null });
+    this.app.store.set({
+      ...NO_POINT_TOOL,
+      placesHotspot: !placesHotspot,
+      selecting: null,
+      hover: null,
+    });
+  }
+
+  /** Takes the tool that collects points for a purpose, or puts it away. */
+  togglePicking(purpose: PickedPoints["purpose"]): void {
+    const { now } = this.app.store;
+    if (purpose === "paste" && selectedEdit(now)?.source == null)
+      return this.app.say("choose an edit that pastes: pairs of points align what is pasted", "warning");
+    const picked = now.picked?.purpose === purpose ? null : { purpose, points: [] };
+    this.app.store.set({ ...NO_POINT_TOOL, picked, selecting: null, hover: null });
+    if (picked !== null) this.app.say(nextPointText(picked));
   }
 
   /** Changes the size of the brush by a step; false where the brush is not the tool. */
@@ -300,7 +319,7 @@ export class Actions {
       pose = hello.cameras[this.cameraIndex];
       this.app.say(`camera ${this.cameraIndex + 1} of ${hello.cameras.length}`);
     }
-    this.app.viewport.lookFrom(pose, hello.start.fov_y_deg, hello.up, around);
+    this.app.viewport.lookFrom(pose, hello.start.fov_y_deg, upOf(this.app.store.now), around);
   }
 
   copy(): void {
@@ -376,8 +395,7 @@ export class Actions {
     const { now } = this.app.store;
     if (cancelDrag()) return;
     if (now.help) this.app.store.set({ help: false });
-    else if (now.measured !== null) this.app.store.set({ measured: null });
-    else if (now.placesHotspot) this.app.store.set({ placesHotspot: false });
+    else if (hasPointTool(now)) this.app.store.set(NO_POINT_TOOL);
     else if (now.selecting !== null) this.app.store.set({ selecting: null });
     else if (now.corners.length > 0) this.app.store.set({ corners: [] });
     else if (now.state?.selected != null) this.command("select", null);

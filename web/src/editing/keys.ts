@@ -69,6 +69,18 @@ export function bindings(
       run: () => actions.toggleMeasuring(),
     },
     {
+      group: "Tools",
+      keys: ["Shift+Y"],
+      action: "Up direction by three points of something level",
+      run: () => actions.togglePicking("up"),
+    },
+    {
+      group: "Edits",
+      keys: ["Shift+A"],
+      action: "Align a paste by three pairs of points",
+      run: () => actions.togglePicking("paste"),
+    },
+    {
       group: "Scene",
       keys: ["Shift+H"],
       action: "Place hotspots: points with a title and text, for exported pages",

@@ -9,7 +9,7 @@ import { snapLength, snapOperation, type Operation } from "./operations";
 import { distanceToCage, pickHandle, pickMeshEdge, pickNetLine, pickPart } from "./picking";
 import { middleOf, planeOf, rowOf, steppedRadius, type NetLine, type Proportional } from "./point_cages";
 import { draggableCages, shownCages } from "./cage_overlay";
-import { dragObstacle, selectedEdit, showsCages, dragTarget, type Hover } from "../app/store";
+import { dragObstacle, hasPointTool, selectedEdit, showsCages, dragTarget, type Hover } from "../app/store";
 
 const SNAP_ANGLE_DEG = 15;
 const SNAP_FACTOR = 0.1;
@@ -35,6 +35,8 @@ export class Pointer {
   measure: (x: number, y: number) => void = () => undefined;
   /** Called with the position of each click while the tool that places hotspots is taken. */
   placeHotspot: (x: number, y: number) => void = () => undefined;
+  /** Called with the position of each click while a tool collects points. */
+  pickPoint: (x: number, y: number) => void = () => undefined;
   /** World axis to which a drag of corners is constrained. */
   private constraint: Constraint = null;
   private hold: Hold | null = null;
@@ -166,6 +168,7 @@ export class Pointer {
     } else if (this.pressed && event.button === 0 && this.travelPixels() < MAX_CLICK_PIXELS) {
       if (this.app.store.now.measured !== null) this.measure(this.position.x, this.position.y);
       else if (this.app.store.now.placesHotspot) this.placeHotspot(this.position.x, this.position.y);
+      else if (this.app.store.now.picked !== null) this.pickPoint(this.position.x, this.position.y);
       else if (event.altKey) this.chooseRow(event);
       else this.select();
     }
@@ -210,7 +213,7 @@ export class Pointer {
     const { now } = this.app.store;
     const edit = selectedEdit(now);
     this.app.gizmo.clearHover();
-    if (now.measured !== null || now.placesHotspot) return null;
+    if (hasPointTool(now)) return null;
     if (edit === null || !showsCages(now) || dragObstacle(now, edit) !== null) return null;
     const { project } = this.app.viewport;
     const { x, y } = this.position;
@@ -346,8 +349,7 @@ export class Pointer {
 
   private place(event: MouseEvent): void {
     this.readPosition(event);
-    const { measured, placesHotspot } = this.app.store.now;
-    if (!this.firstPress.release || event.altKey || measured !== null || placesHotspot) return;
+    if (!this.firstPress.release || event.altKey || hasPointTool(this.app.store.now)) return;
     const { width, height } = this.app.viewport.points;
     this.app.expectEdit();
     const at = { x: clamp(this.position.x / width), y: clamp(this.position.y / height) };

@@ -131,6 +131,12 @@ export class Viewport {
     this.orbit.update();
   }
 
+  /** Orbits about another up direction; the camera stays where it is, and turns upright. */
+  turnUp(up: Vec3): void {
+    if (this.orbit === null || this.camera.up.distanceTo(new Vector3(...up)) <= 1e-6) return;
+    this.lookFrom(this.c2w, this.camera.fov, up, this.sceneCenter);
+  }
+
   /** Looks from a pose exactly, roll included, until the orbit is reset. */
   pose(c2w: readonly number[], fov_y_deg: number): void {
     this.setPose(c2w, fov_y_deg);

@@ -30,7 +30,6 @@ export type PageMessage =
   | OuterMargin
   | Change
   | SceneChange
-  | ScaleChange
   | Command
   | Mirror
   | Reorder
@@ -41,6 +40,7 @@ export type PageMessage =
   | SetPath
   | RenderJob
   | ExportSplats
+  | ExportPage
   | CancelJob
   | SelectRegion
   | SelectRange
@@ -55,9 +55,33 @@ export type PageMessage =
   | PointReach
   | PlaceMesh
   | PutHotspot
-  | MoveHotspot;
+  | MoveHotspot
+  | ScaleChange
+  | UpChange
+  | AlignPaste;
 export type ServerMessage = Hello | State | Dragged | Answer | Notice | Preview | Preparing | Job;
 
+/**
+ * Replace the operations of a paste by the similarity that pairs of points give.
+ *
+ * `refine` brings its surfaces nearer to the scene's, `keep_scale` leaves the scale of the pairs in that;
+ * `match_colors` replaces its grade.
+ */
+export interface AlignPaste {
+  type: "align_paste";
+  edit: number;
+  pairs: PointPair[];
+  refine?: boolean;
+  keep_scale?: boolean;
+  match_colors?: boolean;
+}
+/**
+ * A point of pasted content where it stands, and the scene's point where it belongs: deformed space.
+ */
+export interface PointPair {
+  pasted: Vec3;
+  scene: Vec3;
+}
 /**
  * A whole operation at once, from numeric fields.
  */
@@ -339,6 +363,17 @@ export interface DragMove {
 export interface Drawing {
   type: "drawing";
   here: "nothing" | "moving" | "all";
+}
+/**
+ * Writes a page that shows the edited scene, to be downloaded; in the background.
+ *
+ * One HTML file; with `levels` of detail, of splats, a zip archive of a folder for a web site. Such a page
+ * holds at most `budget` splats at a time, if given.
+ */
+export interface ExportPage {
+  type: "export_page";
+  levels?: boolean;
+  budget?: number | null;
 }
 /**
  * Writes the edited splats, the edits baked in, to a file to be downloaded; in the background.
@@ -646,6 +681,17 @@ export interface Subdivide {
   interpolation?: "linear" | "bspline";
 }
 /**
+ * Change the scene's up direction.
+ *
+ * "points": the normal of a level plane through three points; "floor": that of the dominant plane of the
+ * scene's surfaces; "cameras": forgets it, so that it is that of the cameras.
+ */
+export interface UpChange {
+  type: "up_change";
+  by: "points" | "floor" | "cameras";
+  points?: Vec3[];
+}
+/**
  * The answer to an `ask`: a point and its normal, a text, a grid, the path, sources, or a histogram; or
  * nothing.
  */
@@ -657,6 +703,7 @@ export interface Answer {
   text: string | null;
   grid: Vec3[][];
   stills: Still[];
+  tracks: HotspotTrack[];
   sources: string[];
   histogram: HistogramCounts | null;
   failed: boolean;
@@ -667,6 +714,13 @@ export interface Answer {
 export interface Still {
   c2w: number[];
   fov_y_deg: number;
+}
+/**
+ * Positions of a hotspot, deformed space, at even times of the camera path; null where it is hidden.
+ */
+export interface HotspotTrack {
+  hotspot: number;
+  places: (Vec3 | null)[];
 }
 /**
  * Counts of an attribute's values in even bins between two ends; of sizes, even in their logarithm.
@@ -789,7 +843,7 @@ export interface Job {
   type: "job";
   job: number;
   page: number;
-  what: ("test_views" | "camera_path") | "splats";
+  what: ("test_views" | "camera_path") | ("splats" | "page");
   state: "running" | "done" | "cancelled" | "failed";
   done: number;
   total: number;
@@ -844,6 +898,7 @@ export interface State {
   is_file: boolean;
   preserve_opacity: boolean;
   meters_per_unit: number | null;
+  up: Vec3 | null;
   keys: Key[];
   loop: boolean;
   hotspots: HotspotState[];

@@ -1,7 +1,8 @@
 /** Dialogs before files are written: destination, size, format. */
 import type { App } from "../app/app";
 import { describeDistance } from "../editing/measure_tool";
-import type { ExportSplats, HotspotState, PutHotspot } from "../net/protocol";
+import { selectedEdit } from "../app/store";
+import type { ExportSplats, HotspotState, PointPair, PutHotspot } from "../net/protocol";
 import { h } from "./dom";
 
 const FORMS: [ExportSplats["form"], string][] = [
@@ -14,6 +15,14 @@ const FORMS: [ExportSplats["form"], string][] = [
   ["usda", ".usda: USD text, largest"],
   ["usdc", ".usdc: USD, with usd-core"],
   ["usdz", ".usdz: USD package, with usd-core"],
+];
+
+const PAGE = "page";
+const LEVELS = "levels";
+const VOXEL_PAGE: [string, string][] = [[PAGE, ".html: a page for any browser, with path and hotspots"]];
+const SPLAT_PAGES: [string, string][] = [
+  ...VOXEL_PAGE,
+  [LEVELS, ".zip: a page with levels of detail, for a web site"],
 ];
 
 /** Values of a hotspot; `id` is null for a new one. */
@@ -32,12 +41,14 @@ export interface Dialogs {
   element: HTMLElement;
   saveAs: () => void;
   paste: () => void;
-  /** Asks for the format of the edited splats: as they are now, or of each frame of the camera path. */
+  /** Asks for the format of the edited scene: as it is now, or its splats in each frame of the camera path. */
   download: (frames: boolean) => void;
   /** Asks how many meters a distance in units of the scene is. */
   scale: (distance: number) => void;
   /** Asks for the title and the text of a hotspot; `before` are its values so far. */
   hotspot: (before: HotspotDraft) => void;
+  /** Asks how the selected paste is aligned by pairs of points. */
+  align: (pairs: PointPair[]) => void;
   render: (what: "test_views" | "camera_path") => void;
 }
 
@@ -118,6 +129,29 @@ export function dialogs(app: App): Dialogs {
         if (length > 0) app.send({ type: "scale_change", meters_per_unit: length / distance });
       });
     },
+    align(pairs) {
+      const edit = selectedEdit(app.store.now);
+      if (edit === null) return;
+      const refine = h("input", { type: "checkbox", name: "refine", checked: true });
+      const keepScale = h("input", { type: "checkbox", name: "keep_scale" });
+      const colors = h("input", { type: "checkbox", name: "match_colors" });
+      const fields = [
+        field("Bring the surfaces together (ICP)", refine),
+        field("Keep the scale of the pairs", keepScale),
+        field("Match the colors", colors),
+      ];
+      ask(`Align “${edit.name}” by ${pairs.length} pairs`, "Align", fields, () => {
+        app.store.set({ picked: null });
+        app.send({
+          type: "align_paste",
+          edit: edit.id,
+          pairs,
+          refine: refine.checked,
+          keep_scale: keepScale.checked,
+          match_colors: colors.checked,
+        });
+      });
+    },
     hotspot(before) {
       const title = h("input", { value: before.title, required: true, maxLength: MAX_TITLE, name: "title" });
       const text = h("textarea", { value: before.text, maxLength: MAX_TEXT, name: "text", rows: 5 });
@@ -150,10 +184,13 @@ export function dialogs(app: App): Dialogs {
       );
     },
     download(frames) {
+      const hasSplats = app.store.now.hello?.splats === true;
+      const pages = hasSplats ? SPLAT_PAGES : VOXEL_PAGE;
+      const forms = frames ? FORMS : hasSplats ? [...FORMS, ...pages] : pages;
       const form = h(
         "select",
         { name: "form" },
-        ...FORMS.map(([value, label]) => h("option", { value }, label)),
+        ...forms.map(([value, label]) => h("option", { value }, label)),
       );
       const fps = number(24, 1, 120);
       fps.name = "fps";
@@ -163,15 +200,29 @@ export function dialogs(app: App): Dialogs {
           ? "one file, its frames as time samples"
           : "a .zip, a file for each frame";
       };
-      form.onchange = explain;
-      explain();
       const most = number(1, 1, 1e9);
       Object.assign(most, { name: "splats", value: "", required: false, placeholder: "all" });
+      const budget = number(1, 1, 1e9);
+      Object.assign(budget, { name: "budget", value: "", required: false, placeholder: "all" });
+      const mostField = field("At most so many splats", most);
+      const budgetField = field("Splats held at a time", budget);
+      form.onchange = () => {
+        explain();
+        mostField.hidden = [PAGE, LEVELS].includes(form.value);
+        budgetField.hidden = form.value !== LEVELS;
+      };
+      form.onchange(new Event("change"));
       const fields = [field("File", form)];
-      if (!frames) fields.push(field("At most so many splats", most));
       if (frames) fields.push(field("Frames per second", fps), kind);
-      const title = frames ? "Download the splats of each frame of the path" : "Download the edited splats";
+      else fields.push(mostField, budgetField);
+      const title = frames ? "Download the splats of each frame of the path" : "Download the edited scene";
       ask(title, "Download", fields, () => {
+        if (!frames && [PAGE, LEVELS].includes(form.value)) {
+          const levels = form.value === LEVELS;
+          const count = levels && budget.value !== "" ? Number(budget.value) : null;
+          app.send({ type: "export_page", levels, budget: count });
+          return;
+        }
         app.send({
           type: "export",
           form: form.value as ExportSplats["form"],

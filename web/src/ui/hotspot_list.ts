@@ -3,7 +3,7 @@ import { ChevronUp, Crosshair, MapPin, Pencil, RefreshCw, Trash2 } from "lucide"
 import type { Actions } from "../editing/actions";
 import { surfacePoint } from "../editing/measure_tool";
 import type { App } from "../app/app";
-import { isReadOnly } from "../app/store";
+import { isReadOnly, upOf } from "../app/store";
 import type { HotspotState, Vec3 } from "../net/protocol";
 import { putHotspot, type Dialogs } from "./dialogs";
 import { h, iconButton, section } from "./dom";
@@ -94,8 +94,14 @@ export class Hotspots {
     const { viewport, store } = this.app;
     const { hello } = store.now;
     if (hello === null) return;
-    if (camera !== null) viewport.lookFrom(camera.c2w, camera.fov_y_deg, hello.up, position);
+    if (camera !== null) viewport.lookFrom(camera.c2w, camera.fov_y_deg, upOf(store.now), position);
     else viewport.focus(position, 0.15 * distance(position, viewport.camera.position.toArray()));
+  }
+
+  /** Where a hotspot is seen: in a preview of this page on its way along the path, in another page's nowhere. */
+  private placeOf(hotspot: HotspotState): Vec3 | null {
+    if (this.app.store.now.preview !== null) return this.app.player.placeOf(hotspot);
+    return hotspot.hidden ? null : hotspot.position;
   }
 
   /** Puts the marks where the camera sees their hotspots. */
@@ -105,12 +111,15 @@ export class Hotspots {
     const eye = viewport.camera.position.toArray();
     const slack = OCCLUSION_VOXELS * (store.now.hello?.voxel ?? 0);
     for (const { hotspot, element } of this.buttons) {
-      const { x, y, depth } = viewport.project(hotspot.position);
+      const place = this.placeOf(hotspot);
+      element.hidden = true;
+      if (place === null) continue;
+      const { x, y, depth } = viewport.project(place);
       const inside = depth > 0 && x >= 0 && y >= 0 && x < width && y < height;
-      const far = distance(hotspot.position, eye);
+      const far = distance(place, eye);
       const surface = inside ? pictures.depth.at(x / width, y / height) : null;
       const occluded = surface !== null && surface < far * (1 - OCCLUSION_SHARE) - slack;
-      element.hidden = !inside || occluded || hotspot.hidden || store.now.preview !== null;
+      element.hidden = !inside || occluded;
       if (!element.hidden) element.style.transform = `translate(${x}px, ${y}px)`;
     }
   }

@@ -1,6 +1,7 @@
 /** Background jobs with their progress and a button to cancel them. */
 import { X } from "lucide";
 import type { App } from "../app/app";
+import { isDownload } from "../app/downloads";
 import type { Job } from "../net/protocol";
 import { h, iconButton } from "./dom";
 
@@ -8,6 +9,7 @@ const WHAT: Record<Job["what"], string> = {
   test_views: "Test views",
   camera_path: "Video",
   splats: "Splats",
+  page: "Page",
 };
 const GONE_AFTER = 8000;
 
@@ -25,7 +27,7 @@ export function jobs(app: App): HTMLElement {
 }
 
 function describeJob(job: Job): string {
-  const file = job.what === "splats";
+  const file = isDownload(job);
   if (job.state === "running")
     return file && job.total === 1 ? `writing ${job.out}` : `${job.done} of ${job.total}`;
   if (job.state === "done") return file ? `${job.out} is ready` : `written to ${job.out}`;
@@ -35,7 +37,7 @@ function describeJob(job: Job): string {
 function jobRow(app: App, job: Job): HTMLElement {
   const bar = h("progress", { max: Math.max(1, job.total) });
   // A progress bar without a value shows activity alone.
-  if (job.total > 1 || job.what !== "splats" || job.state !== "running") bar.value = job.done;
+  if (job.total > 1 || !isDownload(job) || job.state !== "running") bar.value = job.done;
   const stop =
     job.state === "running"
       ? iconButton(X, "Cancel", () => app.send({ type: "cancel_job", job: job.job }), "cancel")

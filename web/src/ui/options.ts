@@ -135,6 +135,9 @@ export function options(app: App, actions: Actions): HTMLElement {
   cages.addBinding(model, "margin", { label: "Margin", min: 0.001, format: short });
   cages.addButton({ title: "Outer cage by margin" }).on("click", () => actions.outerMargin(model.margin));
 
+  const align = pane.addButton({ title: "Align by pairs of points (Shift+A)" });
+  align.on("click", () => actions.togglePicking("paste"));
+
   const points = pointOptions(app, actions, pane);
 
   const removeLast = h(
@@ -192,6 +195,8 @@ export function options(app: App, actions: Actions): HTMLElement {
       edit.kind !== "continuous" || edit.shell !== "flow" || edit.cage === "points";
     error.hidden = lattice.hidden || edit.lattice === 0;
     kinds.hidden = edit.source !== null;
+    align.hidden = edit.source === null;
+    align.disabled = edit.locked;
     from.hidden = edit.source === null;
     relight.hidden = !canRelight(now);
     fills.hidden = !canFill(now);

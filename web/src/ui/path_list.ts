@@ -3,6 +3,7 @@ import { Crosshair, Download, Play, Plus, RefreshCw, Repeat, Square, Trash2 } fr
 import type { Actions } from "../editing/actions";
 import type { App } from "../app/app";
 import { pathDuration } from "../app/camera_path";
+import { upOf } from "../app/store";
 import type { EditState, Key, Vec3 } from "../net/protocol";
 import { h, icon, iconButton, iconLink, section } from "./dom";
 
@@ -161,5 +162,5 @@ function lookFrom(app: App, c2w: number[], fov_y_deg: number): void {
   const { hello } = app.store.now;
   if (hello === null) return;
   const around = hello.bounds[0].map((low, i) => 0.5 * (low + hello.bounds[1][i])) as Vec3;
-  app.viewport.lookFrom(c2w, fov_y_deg, hello.up, around);
+  app.viewport.lookFrom(c2w, fov_y_deg, upOf(app.store.now), around);
 }

@@ -74,7 +74,7 @@ export function topbar(
   const load = iconButton(FolderOpen, "Load an edit file, or open splats…", () => file.click(), "load");
   const splats = iconButton(
     FileDown,
-    "Download the edited splats…",
+    "Download the edited scene: splats, or a page…",
     () => dialogs.download(false),
     "download",
   );
@@ -88,7 +88,7 @@ export function topbar(
     undo.disabled = isLooking || (now.state?.entry ?? 0) <= 0;
     redo.disabled = isLooking || now.state === null || now.state.entry >= now.state.history.length - 1;
     for (const button of views) button.classList.toggle("on", button.dataset.view === now.view);
-    splats.hidden = isLooking || now.hello?.splats !== true;
+    splats.hidden = isLooking;
     split.classList.toggle("on", now.split !== null);
     grid.classList.toggle("on", now.grid);
     panel.classList.toggle("on", now.panel);

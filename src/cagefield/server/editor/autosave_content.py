@@ -23,6 +23,7 @@ def autosave_content(document: Document, edits: list[object]) -> dict[str, objec
         "locked": [entry.locked for entry in document.entries],
         "preserve_opacity": document.preserve_opacity,
         "meters_per_unit": document.meters_per_unit,
+        "up": document.up,
         "hotspots": [entry.hotspot.to_dict() for entry in document.hotspots],
         "loop": document.loop,
         "removed": None if document.removed is None else dump_selection(document.removed),
@@ -55,14 +56,16 @@ def parse_autosave(content: dict[str, object]) -> Document:
         for key in content["keys"]  # type: ignore[attr-defined]
     )
     removed = content.get("removed")
+    alignment = Alignment(content.get("meters_per_unit"), content.get("up"))  # type: ignore[arg-type]
     document = Document.from_edits(
         stack,
         preserve_opacity=bool(content["preserve_opacity"]),
         keys=keys,
         loop=bool(content["loop"]),
         removed=None if removed is None else parse_selection(removed),
-        meters_per_unit=Alignment(content.get("meters_per_unit")).meters_per_unit,  # type: ignore[arg-type]
+        meters_per_unit=alignment.meters_per_unit,
         hotspots=hotspots_from_value(content.get("hotspots", [])),
+        up=alignment.direction,
     )
     locked = content["locked"]
     entries = tuple(

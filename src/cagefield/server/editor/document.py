@@ -12,6 +12,7 @@ from cagefield.edits.grade import NEUTRAL_GRADE, Grade
 from cagefield.edits.operations import Operation
 from cagefield.edits.shells import SMOOTH_FLOW, Flow
 from cagefield.errors import EditError
+from cagefield.scene.alignment import Direction
 from cagefield.scene.hotspots import Hotspot
 from cagefield.selection.element_selection import Selection
 from cagefield.server.editor.hotspot_list import HotspotList, numbered
@@ -42,10 +43,12 @@ class Entry:
 
 @dataclass(frozen=True)
 class Document:
-    """The edits in order, the scene's opacity choice and scale, the camera path, hotspots, selected elements.
+    """The edits in order, the scene's opacity choice, scale and up direction, the camera path, hotspots,
+    selected elements.
 
     The selection is undone as edits are, all pages share it, and no file has it; None selects nothing.
-    Elements in `removed` are deleted from the field; None deletes nothing.
+    Elements in `removed` are deleted from the field; None deletes nothing. `up` is a unit vector, None for
+    that of the cameras.
     """
 
     entries: tuple[Entry, ...] = ()
@@ -56,6 +59,7 @@ class Document:
     removed: Selection | None = None
     meters_per_unit: float | None = None
     hotspots: HotspotList = ()
+    up: Direction | None = None
 
     @classmethod
     def from_edits(
@@ -68,9 +72,11 @@ class Document:
         removed: Selection | None = None,
         meters_per_unit: float | None = None,
         hotspots: Iterable[Hotspot] = (),
+        up: Direction | None = None,
     ) -> Document:
         """The document of an edit stack, its edits and hotspots numbered from 1."""
-        document = cls((), preserve_opacity, keys, loop, None, removed, meters_per_unit, numbered(hotspots))
+        numbers = numbered(hotspots)
+        document = cls((), preserve_opacity, keys, loop, None, removed, meters_per_unit, numbers, up)
         for number, edit in enumerate(edits, start=1):
             document = document.insert(Entry(number, edit, document.next_color))
         return document

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cagefield.errors import SceneError
-from cagefield.scene.alignment import Alignment
+from cagefield.scene.alignment import Alignment, Direction
 from cagefield.scene.hotspots import Hotspot
 from cagefield.scene.manifest import read_manifest
 from cagefield.server.editor.document import Document
@@ -24,30 +24,38 @@ class ManifestValues(NamedTuple):
     preserve_opacity: bool
     meters_per_unit: float | None
     hotspots: tuple[Hotspot, ...]
+    up: Direction | None
 
 
 _NAMES = {
     "preserve_opacity": "the opacity choice",
     "meters_per_unit": "the scale",
     "hotspots": "the hotspots",
+    "up": "the up direction",
 }
 """Words for the values in a notice."""
 
 
-def manifest_on_disk(folder: Path) -> tuple[ManifestValues, Alignment] | None:
-    """Values of a folder's manifest, and its alignment; None where it cannot be read."""
+def manifest_on_disk(folder: Path) -> ManifestValues | None:
+    """Values of a folder's manifest; None where it cannot be read."""
     try:
         manifest = read_manifest(folder)
     except (SceneError, OSError):
         return None
-    scale = manifest.alignment.meters_per_unit
-    return ManifestValues(manifest.preserve_opacity, scale, manifest.hotspots), manifest.alignment
+    return manifest_values(manifest.preserve_opacity, manifest.alignment, manifest.hotspots)
+
+
+def manifest_values(
+    preserve_opacity: bool, alignment: Alignment, hotspots: tuple[Hotspot, ...]
+) -> ManifestValues:
+    """Values of a scene or its manifest."""
+    return ManifestValues(preserve_opacity, alignment.meters_per_unit, hotspots, alignment.direction)
 
 
 def values_of_document(document: Document) -> ManifestValues:
     """The document's values."""
     hotspots = tuple(entry.hotspot for entry in document.hotspots)
-    return ManifestValues(document.preserve_opacity, document.meters_per_unit, hotspots)
+    return ManifestValues(document.preserve_opacity, document.meters_per_unit, hotspots, document.up)
 
 
 def merged(
@@ -66,6 +74,8 @@ def merged(
         document = replace(document, preserve_opacity=disk.preserve_opacity)
     if "meters_per_unit" in theirs and "meters_per_unit" not in conflicts:
         document = replace(document, meters_per_unit=disk.meters_per_unit)
+    if "up" in theirs and "up" not in conflicts:
+        document = replace(document, up=disk.up)
     if "hotspots" in theirs and "hotspots" not in conflicts:
         first = max(first_number, next_number(document.hotspots))
         document = replace(document, hotspots=numbered(disk.hotspots, first))

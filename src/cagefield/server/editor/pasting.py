@@ -14,6 +14,13 @@ from cagefield.typing import Array
 PASTE_VIEW_SHARE = 0.5
 """Longest edge of pasted content, as a share of the view's height at the surface below it."""
 
+PICK_MARGIN_SHARE = 0.05
+"""Maximum distance of a picked point from the cage of a paste, as a share of its longest edge."""
+
+NOT_ON_PASTE = (
+    'pair {pair}: its first point is not on what edit "{name}" pastes; click on that first, then '
+    "on the place where the point belongs"
+)
 MIRRORED = "the paste is mirrored about the middle of its cage; crop it first, and mirror it then"
 BENT = "what is pasted was bent; take the moves of its corners back, then set its cage"
 TURNED = "the cage of a paste shrinks, grows and moves in Set mode; turn it in Edit mode (Tab)"
@@ -48,6 +55,32 @@ def crop_paste(edit: Paste, cage: Cage) -> Paste:
     if np.abs(there.deformed.corners - cage.corners).max() > 1e-6 * size:
         raise EditError(TURNED)
     return there
+
+
+def source_points(edit: Paste, points: Array) -> Array:
+    """Points [N,3] of the other scene that stand at points [N,3] of this one, where no parent carries them.
+
+    Raises EditError for a point beside the pasted content.
+    """
+    size = float(np.ptp(edit.deformed.corners, axis=0).max())
+    inside = edit.deformed.grown(PICK_MARGIN_SHARE * size).contains(points)
+    if not inside.all():
+        raise EditError(NOT_ON_PASTE.format(pair=int(np.argmin(inside)) + 1, name=edit.name))
+    phi = edit.map_between(edit.inner, edit.deformed)
+    if phi.affine is not None:
+        A, b = phi.affine
+        return np.asarray(points @ A.T + b)
+    within, found, _ = phi(points)
+    if not within.all():
+        raise EditError(NOT_ON_PASTE.format(pair=int(np.argmin(within)) + 1, name=edit.name))
+    return found
+
+
+def points_at_rest(carrier: Array | None, points: Array) -> Array:
+    """Points [N,3] where parents, by an affine map [3,4], do not carry them."""
+    if carrier is None:
+        return points
+    return np.asarray(np.linalg.solve(carrier[:, :3], (points - carrier[:, 3]).T).T)
 
 
 def crop_problem(edit: Paste, operation: Operation) -> str | None:

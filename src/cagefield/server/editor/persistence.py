@@ -25,6 +25,7 @@ from cagefield.files.atomic import replaced_file
 from cagefield.files.safe_open import FileState, read_bytes, read_text, real_path
 from cagefield.files.stale_files import remove_leftovers, remove_unfinished
 from cagefield.files.temporary_folders import remove_abandoned
+from cagefield.scene.alignment import Alignment
 from cagefield.scene.removed_elements import Removal, dump_removed, read_removed
 from cagefield.scene.scene import Scene
 from cagefield.scene.scene_files import FIELD, MANIFEST, REMOVED, field_states
@@ -32,7 +33,12 @@ from cagefield.server.editor.autosave_content import autosave_content, parse_aut
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.edit_texts import ReadEdits, file_values
 from cagefield.server.editor.identity_cache import IdentityCache
-from cagefield.server.editor.manifest_merge import ManifestValues, manifest_on_disk, values_of_document
+from cagefield.server.editor.manifest_merge import (
+    ManifestValues,
+    manifest_on_disk,
+    manifest_values,
+    values_of_document,
+)
 from cagefield.server.editor.pasted_sources import absolute, admitted, source_in, sources_under, written
 from cagefield.server.editor.scene_lock import SceneLock
 from cagefield.server.editor.session import Session
@@ -103,6 +109,7 @@ class SceneStore:
             removed=read_removed(self.path if self.source is None else self.origin),
             meters_per_unit=self.scene.alignment.meters_per_unit,
             hotspots=self.scene.hotspots,
+            up=self.scene.alignment.direction,
         )
 
     def recovered(self) -> Document | None:
@@ -137,7 +144,7 @@ class SceneStore:
 
     def _opened_values(self) -> ManifestValues:
         scene = self.scene
-        return ManifestValues(scene.preserve_opacity, scene.alignment.meters_per_unit, scene.hotspots)
+        return manifest_values(scene.preserve_opacity, scene.alignment, scene.hotspots)
 
     @property
     def shown_path(self) -> Path:
@@ -275,11 +282,9 @@ class SceneStore:
 
         Raises SceneError, once, where the editor has changed the same values; saving again replaces them.
         """
-        found = manifest_on_disk(self.path)
-        if found is None:
+        disk = manifest_on_disk(self.path)
+        if disk is None:
             return
-        disk, alignment = found
-        self.scene = dataclasses.replace(self.scene, alignment=alignment)
         conflicts = session.take_manifest(self._manifest, disk)
         if conflicts and self._warned_manifest != disk:
             self._warned_manifest = disk
@@ -344,7 +349,7 @@ class SceneStore:
             preserve_opacity=document.preserve_opacity,
             folder=folder,
             removal=removal,
-            alignment=dataclasses.replace(self.scene.alignment, meters_per_unit=document.meters_per_unit),
+            alignment=Alignment.from_direction(document.meters_per_unit, document.up),
             hotspots=tuple(entry.hotspot for entry in document.hotspots),
         )
 

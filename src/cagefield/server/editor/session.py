@@ -10,12 +10,16 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import PurePath
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import Edit, Paste
 from cagefield.edits.operations import Operation
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
 from cagefield.geometry.mesh_cage import MeshCage
+from cagefield.scene.alignment import Alignment
 from cagefield.scene.hotspot_motion import following
 from cagefield.scene.hotspots import Hotspot
 from cagefield.selection.element_selection import Mode, Selection
@@ -105,6 +109,16 @@ class Session(SessionState):
         """The number of a new edit that pastes from another scene, selected."""
         edit = edit.replace(name=fresh_name(self.document, edit.name or "paste"))
         return self._add("Paste from another scene", edit)
+
+    def align(self, number: int, before: Paste, aligned: Paste) -> None:
+        """A paste with the operations and the grade of its alignment.
+
+        Raises EditError where it is not as it was `before` any more.
+        """
+        entry = self._unlocked(number)
+        if entry.edit is not before:
+            raise EditError(f'edit "{before.name}" was changed meanwhile; align it again')
+        self._put(f"Align{suffix_for(entry)}", replace(entry, edit=aligned))
 
     def fit_inner(self, number: int, inner: Cage) -> None:
         """The inner cage as it was fitted to its content."""
@@ -219,6 +233,12 @@ class Session(SessionState):
         """The scene's scale in meters; None forgets it."""
         if meters_per_unit != self.document.meters_per_unit:
             self._push("Scale in meters", replace(self.document, meters_per_unit=meters_per_unit))
+
+    def set_up(self, up: ArrayLike | None) -> None:
+        """The direction [3] that is up; None takes that of the cameras. Raises SceneError for zeros."""
+        direction = Alignment(up=None if up is None else np.asarray(up, np.float64)).direction
+        if direction != self.document.up:
+            self._push("Up direction", replace(self.document, up=direction))
 
     def put_hotspot(self, number: int | None, hotspot: Hotspot, *, follows: bool = False) -> int:
         """The number of a hotspot: a new one for None, else the one of that number, changed.

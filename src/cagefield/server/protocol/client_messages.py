@@ -10,6 +10,7 @@ from cagefield.cameras.camera_paths import MIN_FPS
 from cagefield.edits.options import LATTICE_NODES_RANGE
 from cagefield.server.editor.drag_solver import Target
 from cagefield.server.editor.edit_kinds import Kind
+from cagefield.server.protocol.alignment_messages import AlignmentMessage
 from cagefield.server.protocol.common import (
     MAX_MESSAGE_BYTES,
     CameraMessage,
@@ -207,13 +208,6 @@ class SceneChange(Message):
     preserve_opacity: bool
 
 
-class ScaleChange(Message):
-    """Change the scene's scale; None forgets it."""
-
-    type: Literal["scale_change"] = "scale_change"
-    meters_per_unit: Annotated[float, Field(gt=0, lt=1e12)] | None
-
-
 class Command(Message):
     """Command with an edit's number as its only argument."""
 
@@ -313,6 +307,18 @@ class ExportSplats(Message):
     fps: Annotated[float, Field(ge=MIN_FPS, le=120)] = 24.0
 
 
+class ExportPage(Message):
+    """Writes a page that shows the edited scene, to be downloaded; in the background.
+
+    One HTML file; with `levels` of detail, of splats, a zip archive of a folder for a web site. Such a page
+    holds at most `budget` splats at a time, if given.
+    """
+
+    type: Literal["export_page"] = "export_page"
+    levels: bool = False
+    budget: Annotated[int, Field(ge=1, le=10**9)] | None = None
+
+
 class CancelJob(Message):
     """Stop a job and remove its unfinished file."""
 
@@ -323,8 +329,9 @@ class CancelJob(Message):
 PageMessage: TypeAlias = Annotated[
     CameraMessage | DisplayMessage | PresentedMessage | Drawing | DragBegin | DragMove | DragEnd | DragCancel
     | PlayBegin | Play | PlayEnd | Apply | SetCage | Place | PasteScene | FitInner | OuterMargin | Change
-    | SceneChange | ScaleChange | Command | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath
-    | RenderJob | ExportSplats | CancelJob | SelectionMessage | PointMessage | HotspotMessage,
+    | SceneChange | Command | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath
+    | RenderJob | ExportSplats | ExportPage | CancelJob | SelectionMessage | PointMessage
+    | HotspotMessage | AlignmentMessage,
     Field(discriminator="type"),
 ]  # fmt: skip
 

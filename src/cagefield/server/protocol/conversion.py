@@ -220,6 +220,7 @@ def state_of(
         is_file=is_file,
         preserve_opacity=document.preserve_opacity,
         meters_per_unit=document.meters_per_unit,
+        up=document.up,
         keys=[
             common.Key(c2w=list(key.c2w), fov_y_deg=key.fov_y_deg, seconds=key.seconds, parts=dict(key.parts))
             for key in document.keys

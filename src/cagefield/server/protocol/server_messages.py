@@ -46,6 +46,7 @@ class Hello(Message):
     bounds: tuple[Vec3, Vec3]
     voxel: float
     up: Vec3
+    """Up direction of the cameras."""
     start: CameraMessage
     cameras: list[Pose]
     """Test cameras, or the training ones, to jump to."""
@@ -154,6 +155,8 @@ class State(Message):
     """True for a file that was opened: there is no folder to save into before one is chosen."""
     preserve_opacity: bool
     meters_per_unit: float | None
+    up: Vec3 | None
+    """Direction that is up; None for that of `Hello`."""
     keys: list[Key]
     loop: bool
     hotspots: list[HotspotState]
@@ -203,6 +206,13 @@ class Still(Message):
     fov_y_deg: float
 
 
+class HotspotTrack(Message):
+    """Positions of a hotspot, deformed space, at even times of the camera path; null where it is hidden."""
+
+    hotspot: HotspotId
+    places: list[Vec3 | None]
+
+
 class HistogramCounts(Message):
     """Counts of an attribute's values in even bins between two ends; of sizes, even in their logarithm."""
 
@@ -226,6 +236,8 @@ class Answer(Message):
     """Polylines of a regular grid through the shell, as the edit bends them; the outer cage's frame."""
     stills: list[Still] = Field(default_factory=list)
     """The path's cameras, evenly spread over its time, from its beginning to its end."""
+    tracks: list[HotspotTrack] = Field(default_factory=list)
+    """Of the path, those of hotspots that its edits carry along."""
     sources: list[str] = Field(default_factory=list)
     """Scene folders and files of splats under the server's root that can be pasted."""
     histogram: HistogramCounts | None = None
@@ -264,7 +276,7 @@ class Job(Message):
     type: Literal["job"] = "job"
     job: int
     page: int = 0
-    what: JobKind | Literal["splats"]
+    what: JobKind | Literal["splats", "page"]
     state: Literal["running", "done", "cancelled", "failed"]
     done: int
     total: int

@@ -48,9 +48,10 @@ class BackgroundWork:
         measured: Callable[[], None],
         tell: Callable[[server_messages.ServerMessage], None],
         connected: Callable[[], None] = lambda: None,
+        device: str = "auto",
     ) -> None:
         """`measured` is called when a lattice was, `tell` with jobs' progress for all pages, `connected` when
-        detours of control points are known.
+        detours of control points are known. Pages to download are computed on `device`.
         """
         self._session, self._store = session, store
         self._measured, self._connected, self._tell = measured, connected, tell
@@ -61,7 +62,7 @@ class BackgroundWork:
         self._jobs: list[Job] = []
         self._ending: list[tuple[Job, str]] = []
         self._numbers = 0
-        self.exports = Exports(session, store, tell)
+        self.exports = Exports(session, store, tell, device)
 
     def next(self, generation: int, expects_edits: bool = False) -> BackgroundTask | None:
         """Next background task, or None; tasks of older generations than `generation` are abandoned.
@@ -174,9 +175,11 @@ class BackgroundWork:
         self._jobs.append(job)
         self._tell(_message(job, "running"))
 
-    def export(self, page: int, message: client_messages.ExportSplats) -> None:
-        """Begins to write the edited splats for a page. Raises CagefieldError where there are none, or no
-        keyframes for the frames of a path."""
+    def export(self, page: int, message: client_messages.ExportSplats | client_messages.ExportPage) -> None:
+        """Begins to write the edited splats, or a page of the scene, for a page to download.
+
+        Raises CagefieldError where there are no splats, or no keyframes for the frames of a path.
+        """
         self._numbers += 1
         self.exports.begin(self._numbers, page, message)
 

@@ -13,6 +13,8 @@ import numpy as np
 from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack
 from cagefield.fields.splat_field import SplatField
+from cagefield.scene.alignment import Direction
+from cagefield.scene.paste_sources import up_of_cameras
 from cagefield.selection.element_selection import Selection
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
@@ -86,7 +88,7 @@ class Coordinator:
         worker = self.dispatcher.worker
         worker.files, worker.write_opened = store.files, store.write_opened
         worker.background = store.scene.background
-        self.background = BackgroundWork(session, store, self._measured, self.broadcast, self.changed)
+        self.background = BackgroundWork(session, store, self._measured, self.broadcast, self.changed, device)
         self.highlights = Highlights(session, self._numbered_shown, self._send_highlight)
         self.greeting: str | None = None
         """A line for the pages that come."""
@@ -228,6 +230,14 @@ class Coordinator:
         self.background.exports.close()
         self.dispatcher.close()
         self.store.close()
+
+    @property
+    def up(self) -> Direction:
+        """The unit direction [3] that is up: the document's, else that of the scene's cameras."""
+        if self.session.document.up is not None:
+            return self.session.document.up
+        x, y, z = up_of_cameras(self.store.scene.cameras).tolist()
+        return x, y, z
 
     async def ask(self, make: Callable[[int], Task]) -> Any:
         """Result of a task of the rendering process. Raises CagefieldError."""

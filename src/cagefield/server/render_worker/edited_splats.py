@@ -1,8 +1,9 @@
-"""Edited splats as a file for download: those of a moment, or of each frame of the camera path."""
+"""An edited scene as a file for download: its splats, at a moment or along the camera path, or a page."""
 
 from __future__ import annotations
 
 import dataclasses
+import zipfile
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,33 +12,27 @@ from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import EditStack, Paste
 from cagefield.exporting.path_frames import CameraPath
 from cagefield.formats.splats.usd_writer import USD_SUFFIXES
+from cagefield.scene.alignment import Alignment
+from cagefield.scene.hotspots import Hotspot
 from cagefield.scene.scene import Scene
 from cagefield.selection.element_selection import Selection
 from cagefield.server.protocol.common import SplatForm
 from cagefield.server.render_worker.tasks import EditValues
 
 
-@dataclass(frozen=True)
-class EditedSplats:
-    """Splats of a scene's folder under other edits, without other elements, in another scale than its own.
-
-    The keyframes of `path` name the edits by their place in `edits`, from 1; without a path the file has the
-    splats of a moment.
-    """
+@dataclass(frozen=True, kw_only=True)
+class EditedScene:
+    """A scene's folder under other edits, without other elements, with other alignment than its own."""
 
     scene: str
     name: str
-    form: SplatForm
-    edits: tuple[EditValues, ...]
+    edits: tuple[EditValues, ...] = ()
     preserve_opacity: bool = True
     removed: Selection | None = None
-    meters_per_unit: float | None = None
-    path: CameraPath | None = None
-    splats: int | None = None
-    """Maximum number of splats of a moment, beyond which they are merged; None keeps all."""
+    alignment: Alignment = dataclasses.field(default_factory=Alignment)
 
     def opened(self) -> Scene:
-        """Scene with these edits, elements and scale."""
+        """Scene with these edits, elements and alignment."""
         from cagefield.scene.removed_elements import without_removed
 
         scene = Scene.open(self.scene, whole=True)
@@ -46,18 +41,95 @@ class EditedSplats:
             field=without_removed(scene.field, self.removed),
             edits=EditStack(values.edit() for values in self.edits),
             preserve_opacity=self.preserve_opacity,
-            alignment=dataclasses.replace(scene.alignment, meters_per_unit=self.meters_per_unit),
+            alignment=self.alignment,
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class EditedSplats(EditedScene):
+    """Edited splats as a file of a format.
+
+    The keyframes of `path` name the edits by their place in `edits`, from 1; without a path the file has the
+    splats of a moment.
+    """
+
+    form: SplatForm
+    path: CameraPath | None = None
+    splats: int | None = None
+    """Maximum number of splats of a moment, beyond which they are merged; None keeps all."""
+
+    @property
+    def file_name(self) -> str:
+        """Name of the file; the frames of a path are a zip archive, but for USD."""
+        is_archive = self.path is not None and not is_usd(self.form)
+        return f"{self.name}.{self.form}.zip" if is_archive else f"{self.name}.{self.form}"
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return 1 if self.path is None else len(self.path.stills())
+
+    def write(self, out: str, *, on_progress: Callable[[float], None] = lambda done: None) -> None:
+        """Write the file; see `write_edited`."""
+        write_edited(self, out, on_progress=on_progress)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EditedPage(EditedScene):
+    """A page of the edited scene (`pages.scene_page`) with its camera path and hotspots.
+
+    Keyframes name the edits by their place in `edits`, from 1.
+    """
+
+    keys: tuple[Keyframe, ...] = ()
+    loop: bool = False
+    hotspots: tuple[Hotspot, ...] = ()
+    levels: bool = False
+    """Whether it has levels of detail; the file is then a zip archive of a folder for a web site."""
+    budget: int | None = None
+    device: str = "auto"
+
+    @property
+    def file_name(self) -> str:
+        """Name of the file."""
+        return f"{self.name}.page.zip" if self.levels else f"{self.name}.html"
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return 1
+
+    def write(self, out: str, *, on_progress: Callable[[float], None] = lambda done: None) -> None:
+        """Write the file. Raises CagefieldError as `ScenePage.build` does."""
+        from cagefield.compute import devices
+        from cagefield.files.atomic import replaced_file
+        from cagefield.pages.scene_page import ScenePage
+
+        devices.start(self.device)
+        scene = dataclasses.replace(self.opened(), hotspots=self.hotspots)
+        page = ScenePage.build(
+            scene,
+            self.name,
+            self.keys,
+            loop=self.loop,
+            levels=self.levels,
+            budget=self.budget,
+            on_progress=on_progress,
+        )
+        path = Path(out)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replaced_file(path) as draft:
+            if self.levels:
+                with zipfile.ZipFile(draft, "w", zipfile.ZIP_STORED) as archive:
+                    for name, data in page.folder().items():
+                        archive.writestr(f"{self.name}/{name}", data)
+            else:
+                draft.write_text(page.one_file(), encoding="utf-8")
 
 
 def is_usd(form: SplatForm) -> bool:
     """Whether a format is one of USD: it holds several prims, and frames as time samples."""
     return f".{form}" in USD_SUFFIXES
-
-
-def file_name(scene: str, form: SplatForm, along_path: bool) -> str:
-    """Name of the file of a scene's splats; the frames of a path are a zip archive, but for USD."""
-    return f"{scene}.{form}.zip" if along_path and not is_usd(form) else f"{scene}.{form}"
 
 
 def keys_of(keys: Iterable[Keyframe], places: Mapping[int, int]) -> tuple[Keyframe, ...]:
@@ -73,7 +145,7 @@ def keys_of(keys: Iterable[Keyframe], places: Mapping[int, int]) -> tuple[Keyfra
 def write_edited(
     content: EditedSplats, out: str, *, on_progress: Callable[[float], None] = lambda done: None
 ) -> None:
-    """Write edited splats: `out` has a name of `file_name`. Pastes are prims of their own in USD.
+    """Write edited splats: `out` ends as `EditedSplats.file_name`. Pastes are prims of their own in USD.
 
     Raises:
         CagefieldError: a scene of voxels, a format whose library is missing.

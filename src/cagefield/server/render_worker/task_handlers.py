@@ -17,6 +17,7 @@ from cagefield.geometry.control_points import ControlPoints
 from cagefield.rendering.splats.raster_splats import deformed_splats
 from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.server.editor.cage_placement import probes
+from cagefield.server.render_worker.alignment import aligned_paste, floor_of
 from cagefield.server.render_worker.cancellation import GivenUpError, cancellation_check
 from cagefield.server.render_worker.encoding import picture_of, png
 from cagefield.server.render_worker.grid_lines import grid_lines
@@ -26,12 +27,14 @@ from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.selection_handlers import SelectionHandlers
 from cagefield.server.render_worker.splat_density import dense_cells
 from cagefield.server.render_worker.tasks import (
+    AlignTask,
     Answered,
     BoxTask,
     DetoursTask,
     EndJobTask,
     ErrorTask,
     FitTask,
+    FloorTask,
     FrameTask,
     GridTask,
     HighlightTask,
@@ -43,6 +46,7 @@ from cagefield.server.render_worker.tasks import (
     PickTask,
     PictureTask,
     Result,
+    Shown,
     StillTask,
     Stopped,
     SurfaceTask,
@@ -97,7 +101,15 @@ class TaskHandlers:
 
     def _answer(
         self,
-        task: SurfaceTask | FitTask | LookTask | WarmTask | GridTask | EndJobTask | PageFieldTask,
+        task: SurfaceTask
+        | FitTask
+        | LookTask
+        | FloorTask
+        | AlignTask
+        | WarmTask
+        | GridTask
+        | EndJobTask
+        | PageFieldTask,
     ) -> Any:
         if isinstance(task, SurfaceTask):
             return self._surface(task)
@@ -105,6 +117,10 @@ class TaskHandlers:
             return self._fit(task)
         if isinstance(task, LookTask):
             return self._look(task)
+        if isinstance(task, FloorTask):
+            return floor_of(self._renderers.shown_scene(Shown((), removed=task.removed)), task)
+        if isinstance(task, AlignTask):
+            return aligned_paste(self._renderers.shown_scene(Shown((), removed=task.removed)), task)
         if isinstance(task, WarmTask):
             return self._renderers.warm(task.stage)
         if isinstance(task, EndJobTask):
@@ -214,8 +230,8 @@ class TaskHandlers:
         sigma, _ = edited(points, np.tile(np.array([1.0, 0.0, 0.0], np.float32), (len(points), 1)))
         return (sigma * field.sample_spacing > DENSE_VOXEL_OPACITY).tolist()
 
-    def _look(self, task: LookTask) -> tuple[list[list[float]], list[float], list[float]]:
-        """(box, up direction) of the content to paste, and this scene's up direction."""
+    def _look(self, task: LookTask) -> tuple[list[list[float]], list[float]]:
+        """(box, up direction) of the content to paste."""
         scene = self._renderers.scene
         look = scene.sources.look(task.source, scene.field)
-        return look.box.tolist(), look.up.tolist(), scene.up.tolist()
+        return look.box.tolist(), look.up.tolist()

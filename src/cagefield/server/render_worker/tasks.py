@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum
 from typing import Any, Literal, TypeAlias
@@ -117,10 +117,33 @@ class FitTask:
 
 @dataclass(frozen=True)
 class LookTask:
-    """Query of the content to paste, a scene or a file: its box, its up direction, and this scene's."""
+    """Query of the content to paste, a scene or a file: its box and its up direction."""
 
     number: int
     source: str
+
+
+@dataclass(frozen=True)
+class FloorTask:
+    """Query of the dominant plane of the field's visible surfaces; `up` [3] is the direction up so far."""
+
+    number: int
+    up: tuple[float, float, float]
+    removed: Selection | None = None
+
+
+@dataclass(frozen=True)
+class AlignTask:
+    """Alignment of a paste with the field: points [N,3] of its source, and those where they belong."""
+
+    number: int
+    edit: EditValues
+    source_points: Sequence[Sequence[float]]
+    points: Sequence[Sequence[float]]
+    refine: bool
+    keep_scale: bool
+    match_colors: bool
+    removed: Selection | None = None
 
 
 @dataclass(frozen=True)
@@ -268,6 +291,8 @@ Task: TypeAlias = (
     | SurfaceTask
     | FitTask
     | LookTask
+    | FloorTask
+    | AlignTask
     | WarmTask
     | LightTask
     | ErrorTask

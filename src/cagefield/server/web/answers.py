@@ -10,10 +10,11 @@ import numpy as np
 from cagefield.edits import Continuous, EditStack, dump_edits
 from cagefield.errors import CagefieldError
 from cagefield.server.protocol.client_messages import Ask
-from cagefield.server.protocol.conversion import stills_of, view_height
+from cagefield.server.protocol.conversion import view_height
 from cagefield.server.protocol.server_messages import Answer
 from cagefield.server.render_queue.coordinator import Coordinator, Page
 from cagefield.server.render_worker.tasks import EditValues, GridTask, Shown, SurfaceTask, values_of
+from cagefield.server.web.hotspot_handlers import path_of
 from cagefield.server.web.selection_handlers import histogram_of
 from cagefield.typing import Array
 
@@ -40,7 +41,7 @@ async def answer_of(coordinator: Coordinator, page: Page, message: Ask) -> Answe
         counts = await histogram_of(coordinator, message.attribute)
         return Answer(request=message.request, histogram=counts)
     if message.what == "path":
-        return Answer(request=message.request, stills=stills_of(document.keys, document.loop))
+        return await path_of(coordinator.session, message.request)
     found = await _surface(coordinator, page, message.x, message.y)
     if found is None:
         return Answer(request=message.request)

@@ -15,6 +15,7 @@ from cagefield.server.editor.edit_texts import read_edits
 from cagefield.server.editor.pasting import build_paste
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import (
+    alignment_messages,
     client_messages,
     common,
     hotspot_messages,
@@ -37,6 +38,7 @@ from cagefield.server.render_worker.tasks import (
     values_of,
 )
 from cagefield.server.render_worker.view import Display
+from cagefield.server.web.alignment_handlers import change_alignment
 from cagefield.server.web.answers import answer_of, seen_point
 from cagefield.server.web.hotspot_handlers import change_hotspots
 from cagefield.server.web.point_handlers import PointChange, change_points
@@ -219,11 +221,10 @@ class MessageHandlers:
     @_handles(client_messages.PasteScene)
     async def _paste_scene(self, message: client_messages.PasteScene) -> None:
         path = self._coordinator.store.source_of(message.source)
-        box, up, own_up = await self._coordinator.ask(lambda number: LookTask(number, str(path)))
+        box, up = await self._coordinator.ask(lambda number: LookTask(number, str(path)))
         point, height = await seen_point(self._coordinator, self._page, None, None)
-        edit = build_paste(
-            str(path), path.stem[:100], np.array(box), np.array(up), point, np.array(own_up), height
-        )
+        own_up = np.array(self._coordinator.up)
+        edit = build_paste(str(path), path.stem[:100], np.array(box), np.array(up), point, own_up, height)
         self._session.paste(edit)
         self._coordinator.changed()
 
@@ -273,9 +274,11 @@ class MessageHandlers:
         self._session.preserve_opacity(message.preserve_opacity)
         self._coordinator.changed()
 
-    @_handles(client_messages.ScaleChange)
-    def _scale_change(self, message: client_messages.ScaleChange) -> None:
-        self._session.set_scale(message.meters_per_unit)
+    @_handles(alignment_messages.ScaleChange)
+    @_handles(alignment_messages.UpChange)
+    @_handles(alignment_messages.AlignPaste)
+    async def _change_alignment(self, message: alignment_messages.AlignmentMessage) -> None:
+        await change_alignment(self._coordinator, self._page, message)
         self._coordinator.changed()
 
     @_handles(hotspot_messages.PutHotspot)
@@ -340,7 +343,8 @@ class MessageHandlers:
         self._coordinator.pump()
 
     @_handles(client_messages.ExportSplats)
-    def _export(self, message: client_messages.ExportSplats) -> None:
+    @_handles(client_messages.ExportPage)
+    def _export(self, message: client_messages.ExportSplats | client_messages.ExportPage) -> None:
         self._coordinator.background.export(self._page.number, message)
 
     @_handles(client_messages.CancelJob)

@@ -1,10 +1,27 @@
-"""Handlers of messages about hotspots."""
+"""Handlers of messages about hotspots, and of the question for the camera path that their marks follow."""
 
 from __future__ import annotations
 
 from cagefield.scene.hotspots import Hotspot, HotspotView
+from cagefield.server.editor.hotspot_tracks import hotspot_tracks
 from cagefield.server.editor.session import Session
+from cagefield.server.protocol.conversion import stills_of
 from cagefield.server.protocol.hotspot_messages import HotspotMessage, PutHotspot
+from cagefield.server.protocol.server_messages import Answer, HotspotTrack
+from cagefield.server.web.worker_threads import run_in_thread
+
+
+async def path_of(session: Session, request: int) -> Answer:
+    """Answer with the camera path and the tracks of hotspots on it. Raises CameraError without a motion."""
+    document = session.document
+    problems = {id(entry.edit): session.problem(entry.edit) for entry in document.entries}
+    stills = stills_of(document.keys, document.loop)
+    tracks = await run_in_thread(lambda: hotspot_tracks(document, lambda edit: problems[id(edit)]))
+    return Answer(
+        request=request,
+        stills=stills,
+        tracks=[HotspotTrack(hotspot=number, places=places) for number, places in tracks.items()],
+    )
 
 
 def change_hotspots(session: Session, message: HotspotMessage) -> None:
