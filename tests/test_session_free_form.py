@@ -34,12 +34,19 @@ LINEAR = Edit.continuous(BOX.subdivided((2, 1, 2), "linear"), OUTER, name="linea
 MESH = Edit.continuous(MeshCage.of_box(BOX), OUTER, name="mesh")
 POINTS = Edit.points([[0, 0, 0.2], [0.2, 0, 0]], radius=0.3, name="points")
 
+TAPER = Taper("z", 0.8)
 UP, ASIDE = (0.0, 0.0, 0.04), (0.05, 0.0, 0.0)
 
 GESTURES: dict[str, tuple[Edit, tuple[Operation, ...]]] = {
     "lattice": (
         LATTICE,
-        (MovePoint(3, UP), MovePoints((4, 5), ASIDE, 0.3), Bend("z", 40.0), Twist("z", 90.0), Taper("z", 0.8)),
+        (
+            MovePoint(3, UP),
+            MovePoints((4, 5), ASIDE, 0.3),
+            Bend("z", 40.0),
+            Twist("z", 90.0),
+            Taper("z", 0.8),
+        ),
     ),
     "linear lattice": (LINEAR, (MovePoints((0, 1, 2), ASIDE), Twist("z", 40.0), Rotate((0, 0, 20)))),
     "mesh": (MESH, (MovePoint(7, UP), Bend("z", 30.0), Twist("z", 60.0), Translate(ASIDE))),

@@ -35,6 +35,7 @@ pytestmark = [
         ("edit --overwrite", 15, 3),
         ("edit --overwrite, renames", 15, 9),
         ("changes and saves", 60, 15),
+        pytest.param("changes and saves, free-form", 30, 15, marks=pytest.mark.nightly),
         ("save as", 15, 5),
         ("convert .sog", 8, 4),
         ("export .glb", 8, 4),
@@ -43,7 +44,7 @@ pytestmark = [
     ],
 )
 def test_killed_at_a_call_that_writes(tmp_path: Path, name: str, least: int, step: int) -> None:
-    command, found = COMMANDS[name], Killed()
+    command, found = (COMMANDS | SLOW_COMMANDS)[name], Killed()
     calls, _ = calls_of(name, tmp_path)
     assert calls >= least
     for at in range(1 + step // 2, calls + 1, step):
