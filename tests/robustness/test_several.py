@@ -20,12 +20,6 @@ from scenes import ball_scene, files_of
 BALL = {"inner": {"center": [0, 0, 0], "size": 1}, "adjustment": "discrete", "name": "ball"}
 OTHER = {"inner": {"center": [0, 0, 0.5], "size": 0.4}, "adjustment": "discrete", "name": "other"}
 
-LATTICE = {
-    "inner": {"center": [0, 0, 0.5], "size": 0.4, "lattice": {"points": [2, 2, 4]}},
-    "outer": {"margin": 0.4},
-    "name": "lattice",
-}
-
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
@@ -45,15 +39,6 @@ def server(scene: Path) -> Iterator[EditorServer]:
 
 def by(x: float = 0.0, y: float = 0.0) -> dict[str, Any]:
     return {"kind": "translate", "by": [x, y, 0.0]}
-
-
-def point(number: int, z: float) -> dict[str, Any]:
-    return {"kind": "move_point", "point": number, "by": [0.0, 0.0, z]}
-
-
-def points_of(state: dict[str, Any], edit: int) -> np.ndarray[Any, Any]:
-    """Where an edit's control points [N,3] are shown."""
-    return np.array(next(shown["points"]["deformed"] for shown in state["edits"] if shown["id"] == edit))
 
 
 def settled(client: PageClient) -> dict[str, Any]:
@@ -100,30 +85,6 @@ def test_two_people_drag_one_edit(server: EditorServer) -> None:
         assert edits_of(server)[0].operations == (Translate((0.1, 0.2, 0)),)  # two moves, joined
         one.send("command", name="undo")  # takes back the last, whoever did it
         np.testing.assert_allclose(middle(settled(one), edit), (0.1, 0.0, 0.0), atol=1e-5)
-
-
-def test_two_people_drag_points_of_one_lattice(server: EditorServer) -> None:
-    with page(server) as (one, _), page(server) as (two, _):
-        one.send("load_edits", text=json.dumps({"edits": [LATTICE]}))
-        state = one.state(lambda state: state["edits"][-1]["name"] == "lattice")
-        edit = state["edits"][-1]["id"]
-        before = points_of(state, edit)
-        assert len(before) == 16
-        for client in (one, two):
-            client.send("drag_begin", drag=1, edit=edit, target="field")
-        for n in (1, 2):
-            one.send("drag", drag=1, seq=n, operation=point(12, z=0.01 * n))
-            two.send("drag", drag=1, seq=n, operation=point(3, z=-0.01 * n))
-        one.send("drag_end", drag=1, seq=3, operation=point(12, z=0.02))
-        settled(one)
-        two.send("drag_end", drag=1, seq=3, operation=point(3, z=-0.02))
-        moved = points_of(settled(two), edit) - before
-        assert errors(one) == errors(two) == []
-        np.testing.assert_allclose(moved[[12, 3], 2], [0.02, -0.02], atol=1e-5)
-        assert np.abs(np.delete(moved, [12, 3], axis=0)).max() < 1e-5
-        one.send("command", name="undo")
-        moved = points_of(settled(one), edit) - before
-        np.testing.assert_allclose(moved[[12, 3], 2], [0.02, 0.0], atol=1e-5)
 
 
 def test_one_removes_what_another_drags(server: EditorServer) -> None:
