@@ -6,12 +6,17 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage
+from cagefield.geometry.triangle_mesh import check_crossings
+from cagefield.selection import enclosing_mesh
 from cagefield.selection.bounding_cages import lattice_cells, oriented_box
 from cagefield.selection.enclosing_mesh import CageMesh, cage_mesh
+from cagefield.selection.mesh_decimation import decimate
+from cagefield.typing import Array
 from tiers import nightly_after_first
 
 
@@ -130,6 +135,25 @@ def test_a_hollow_selection_has_one_surface() -> None:
     radius = np.linalg.norm(mesh.vertices, axis=1)
     # Half of a cell, the diagonal of one, and the corners that decimation cuts.
     assert mesh.margin < 0.3 and abs(radius - 1.0 - mesh.margin).max() < 0.12
+
+
+def test_a_decimated_mesh_that_crosses_itself_is_made_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its collapses may take one part through another: then the level grows."""
+    made: list[float] = []
+
+    def decimated(vertices: Array, faces: NDArray[np.int32], most: int) -> tuple[Array, NDArray[np.int32]]:
+        v, f = decimate(vertices, faces, most)
+        made.append(float(np.ptp(v, axis=0).max()))
+        if len(made) == 1:  # the highest vertex goes down through the bottom
+            v[np.argmax(v[:, 2])] = v.mean(axis=0) - (0.0, 0.0, 3.0 * made[0])
+        return v, f
+
+    monkeypatch.setattr(enclosing_mesh, "decimate", decimated)
+    monkeypatch.setattr(enclosing_mesh, "encloses", lambda v, f, p: np.ones(len(p), bool))
+    points = np.random.default_rng(1).uniform(-0.2, 0.2, (400, 3))
+    mesh = cage_mesh(points, 0.1, max_faces=120)
+    assert len(made) == 2 and made[1] > made[0]
+    check_crossings(mesh.vertices, mesh.faces)
 
 
 def test_meshes_that_cannot_be() -> None:

@@ -8,9 +8,11 @@ or pulled in closed form, without the code of edits.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.resources import files
+from typing import Literal
 
 import numpy as np
 
@@ -19,6 +21,7 @@ from cagefield.edits.edit_files import parse_edits
 from cagefield.errors import CagefieldError
 from cagefield.procedural import ProceduralScene
 from cagefield.procedural.deformations import ArcBend, AxialTwist, PointPull
+from cagefield.warps import mesh_flow
 
 WEIGHT_CENTER = (-0.6493, 0.0, 0.142)
 PINECONE_CENTER = (0.419, -0.3, -0.211)
@@ -30,6 +33,7 @@ class Case:
 
     `moved` is the truth of the edit, None where that is the scene seen through the exact map. `deformed` is
     the scene of the truth in closed form, of which the inside of the last edit's inner cage is compared.
+    `blend` is that of the vertices' motion inside of a mesh cage: the product's is harmonic.
     """
 
     scene: str
@@ -37,6 +41,7 @@ class Case:
     moved: Callable[[ProceduralScene], ProceduralScene] | None = None
     named_file: str | None = None
     deformed: Callable[[ProceduralScene], ProceduralScene] | None = None
+    blend: Literal["harmonic", "mean value"] = "harmonic"
 
     @property
     def file(self) -> str:
@@ -58,7 +63,19 @@ class Case:
         """Measured edits: an exact map, where that is the truth, carries the light along as it was."""
         if self.moved is not None:
             return self.given
-        return EditStack(edit.replace(relight="none") for edit in self.given)
+        # What is made of an edit is kept for all that equal it: another blend takes another name.
+        named = {} if self.blend == "harmonic" else {"name": self.name}
+        return EditStack(edit.replace(relight="none", **named) for edit in self.given)
+
+    @contextmanager
+    def blended(self) -> Iterator[None]:
+        """Context in which maps of mesh cages have the case's blend."""
+        sweeps = mesh_flow.HARMONIC_SWEEPS
+        mesh_flow.HARMONIC_SWEEPS = sweeps if self.blend == "harmonic" else 0
+        try:
+            yield
+        finally:
+            mesh_flow.HARMONIC_SWEEPS = sweeps
 
     @property
     def kind(self) -> str:
@@ -112,21 +129,39 @@ STEM_TWIST = AxialTwist((-0.2, 0.12, 0.01), (0, 0, 1), 0.96, np.radians(90))
 CABLE_BEND = ArcBend((-0.05, 0.07, 0.28), (0, 0, -1), (1, 0, 0), 0.3, np.radians(35))
 CREST_PULL = PointPull((-0.57, 0, 0.97), (0.12, 0, 0.22), 0.45)
 
+FLOWER_PIVOT = (-0.18, 0.11, 0.83)
+
+
+def _bent_arm(scene: ProceduralScene) -> ProceduralScene:
+    parts = ("stick", "bucket")
+    return scene.deform(parts, ARM_BEND).move(parts, translate=(0, 0, 0.12))
+
+
 FREE_FORM_CASES = (
+    Case("digger", "bend_arm", deformed=_bent_arm),
+    Case("digger", "bend_arm_mesh", deformed=_bent_arm),
     Case(
         "digger",
-        "bend_arm",
-        deformed=lambda s: s.deform(("stick", "bucket"), ARM_BEND).move(
-            ("stick", "bucket"), translate=(0, 0, 0.12)
-        ),
+        "bend_arm_mean_value",
+        named_file="digger_bend_arm_mesh.yaml",
+        deformed=_bent_arm,
+        blend="mean value",
     ),
+    Case("digger", "move_painted_cone", lambda s: s.move("cone", translate=(0, -0.97, 0))),
     Case("plant", "twist_stem", deformed=lambda s: s.deform(("plant", "flower"), STEM_TWIST)),
     Case("plant", "pull_flower", deformed=lambda s: s.move("flower", translate=(0.1, -0.1, 0.12))),
+    Case(
+        "plant",
+        "turn_painted_flower",
+        deformed=lambda s: s.move(
+            "flower", translate=(0.1, -0.1, 0.12), rotate=(0, np.radians(25), 0), pivot=FLOWER_PIVOT
+        ),
+    ),
     Case("microphone", "straighten_cable", deformed=lambda s: s.deform("cable", CABLE_BEND)),
     Case("chair", "pull_crest", deformed=lambda s: s.deform("back", CREST_PULL)),
 )
-"""Edits by lattices, control points and selections, measured where they are named: the other methods of the
-shell have no such cages."""
+"""Edits by lattices, meshes, control points and painted selections, measured where they are named: the other
+methods of the shell have no such cages."""
 
 _STRETCHED = ("tracks", "body", "cabin", "boom", "stick", "bucket", "cone")
 

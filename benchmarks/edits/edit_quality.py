@@ -47,52 +47,54 @@ def measure(cases: Sequence[Case], bench: Workbench, *, taught: bool = False) ->
     for case in cases:
         if scene is None or case.scene != name:
             scene, name, unedited = bench.scene(case.scene), case.scene, {}
-        edited = scene.with_edits(case.edits)
-        ratio = frame_ratio(scene, edited)
-        cameras = scene.cameras["test"]
-        measured, taken, revealed = None, None, None
-        if case.kind == "continuous":
-            edit = continuous(case)
-            measured, taken = distortion(edit.exact_warp, edit), map_time(case.edits)
-        if case.moved is None:
-            size = bench.settings.exact_size
-            cameras = tuple(camera.resized(size, size) for camera in cameras[: bench.settings.exact_views])
-            truth, before = "exact map", bench.mapped(name, None, cameras)
-            after, rays = bench.mapped(name, case.edits, cameras), FINER
-        else:
-            cameras = cameras[: bench.settings.discrete_views]
-            truth, before = "photos", bench.modeled(name, cameras)
-            after, rays = bench.moved(case, cameras), 1
-        if truth not in unedited:
-            unedited[truth] = seen(scene, cameras, rays)
-        pictures = seen(edited, cameras, rays)
-        inside = None
-        if case.deformed is not None:
-            inside = inside_figures(case, bench, cameras, unedited[truth], pictures, before)
-        if case.moved is not None:
-            revealed = _revealed(case, bench, cameras, unedited[truth], pictures, taught)
-        figures = compare(unedited[truth], pictures, before, after)
-        naive: tuple[float, ...] = ()
-        if isinstance(scene.field, SplatField):
-            naive = tuple(
-                figures.unedited - mean_psnr(naively, after)
-                for _, naively in seen_naively(edited, cameras, rays)
+        with case.blended():
+            edited = scene.with_edits(case.edits)
+            ratio = frame_ratio(scene, edited)
+            cameras = scene.cameras["test"]
+            measured, taken, revealed = None, None, None
+            if case.kind == "continuous":
+                edit = continuous(case)
+                measured, taken = distortion(edit.exact_warp, edit), map_time(case.edits)
+            if case.moved is None:
+                size = bench.settings.exact_size
+                exact_views = cameras[: bench.settings.exact_views]
+                cameras = tuple(camera.resized(size, size) for camera in exact_views)
+                truth, before = "exact map", bench.mapped(name, None, cameras)
+                after, rays = bench.mapped(name, case.edits, cameras), FINER
+            else:
+                cameras = cameras[: bench.settings.discrete_views]
+                truth, before = "photos", bench.modeled(name, cameras)
+                after, rays = bench.moved(case, cameras), 1
+            if truth not in unedited:
+                unedited[truth] = seen(scene, cameras, rays)
+            pictures = seen(edited, cameras, rays)
+            inside = None
+            if case.deformed is not None:
+                inside = inside_figures(case, bench, cameras, unedited[truth], pictures, before)
+            if case.moved is not None:
+                revealed = _revealed(case, bench, cameras, unedited[truth], pictures, taught)
+            figures = compare(unedited[truth], pictures, before, after)
+            naive: tuple[float, ...] = ()
+            if isinstance(scene.field, SplatField):
+                naive = tuple(
+                    figures.unedited - mean_psnr(naively, after)
+                    for _, naively in seen_naively(edited, cameras, rays)
+                )
+            both = (perceived(unedited[truth], before), perceived(pictures, after)) if perceived else None
+            yield Score(
+                case,
+                truth,
+                len(cameras),
+                cameras[0].width,
+                figures,
+                ratio,
+                measured,
+                taken,
+                both,
+                revealed,
+                naive,
+                inside,
             )
-        both = (perceived(unedited[truth], before), perceived(pictures, after)) if perceived else None
-        yield Score(
-            case,
-            truth,
-            len(cameras),
-            cameras[0].width,
-            figures,
-            ratio,
-            measured,
-            taken,
-            both,
-            revealed,
-            naive,
-            inside,
-        )
 
 
 def _revealed(
@@ -152,10 +154,13 @@ def write_picture(case: Case, bench: Workbench, folder: Path, size: int, *, erro
     camera = eye(case.scene, size)
     scene = bench.scene(case.scene)
     before = cast(AnyArray, shown(scene, camera).rgb8())
-    after = shown(scene.with_edits(case.given), camera).rgb8()
-    truth = (
-        bench.mapped(case.scene, case.edits, [camera]) if case.moved is None else bench.moved(case, [camera])
-    )
+    with case.blended():
+        after = shown(scene.with_edits(case.given), camera).rgb8()
+        truth = (
+            bench.mapped(case.scene, case.edits, [camera])
+            if case.moved is None
+            else bench.moved(case, [camera])
+        )
     panels = [before, after, truth[0]]
     if error:
         difference = np.abs(floats(after) - floats(truth[0])).max(axis=-1, keepdims=True)

@@ -31,7 +31,8 @@ from kill_points import Say
 from cagefield import Scene
 from cagefield.datasets import load_dataset
 from cagefield.datasets.sfm.transforms_writer import write_transforms
-from cagefield.edits import MovePoint
+from cagefield.edits import MovePoint, MovePoints, Twist
+from cagefield.geometry.control_points import ControlPoints
 from cagefield.geometry.mesh_cage import MeshCage
 from cagefield.geometry.mesh_files import read_mesh_cage
 from cagefield.images.image_files import write_png
@@ -145,7 +146,8 @@ def _free_form_problem(folder: Path, said: int) -> str | None:
 
 
 def _free_form_session(folder: Path, say: Say) -> None:
-    """An editor: moves one vertex more at step n, keeps it, and says 2 n; saves it last and says 1 more."""
+    """An editor: at step n moves a vertex, moves and twists a lattice, widens the reach of control points,
+    keeps them and says 2 n; saves them last and says 1 more."""
     scene = Scene.open(folder / "scene")
     store = SceneStore(scene, folder / "scene")
     store.lock()
@@ -153,16 +155,24 @@ def _free_form_session(folder: Path, say: Say) -> None:
     if not session.document.entries:
         text = (folder / "e.yaml").read_text().replace("file: cube.obj", _mesh_text(folder))
         session.load_edits(text, False)
-    mesh = session.document.entries[2]
+    lattice, points, mesh = session.document.entries
     before = len(mesh.edit.operations) - 1
     for number in range(1, 4):
         vertex = (before + number) % 7
         session.apply(mesh.id, "field", MovePoint(vertex, (0.0, 0.0, 0.01)))
+        session.apply(lattice.id, "field", MovePoints((vertex, 20), (0.0, 0.005, 0.0), 0.3))
+        session.apply(lattice.id, "field", Twist("z", 2.0))
+        session.point_reach(points.id, _reach(before + number), None)
         store.autosave(session)
         say(2 * number)
     store.save(session)
     say(7)
     store.close()
+
+
+def _reach(changes: int) -> float:
+    """Radius of the control points after so many changes of it."""
+    return 0.4 + 0.01 * changes
 
 
 def _mesh_text(folder: Path) -> str:
@@ -180,6 +190,13 @@ def _free_form_session_problem(folder: Path, said: int) -> str | None:
     moves = len(entries[2].edit.operations) - 1 if len(entries) == 3 else -1
     if moves < said // 2:
         return f"lost: {said // 2} moves of vertices were kept, {moves} are there"
+    lattice, points = entries[0].edit, entries[1].edit.inner
+    if len(lattice.operations) != 1 + 2 * moves or not isinstance(points, ControlPoints):
+        return (
+            f"lost: {moves} moves and twists of the lattice, {len(lattice.operations)} operations are there"
+        )
+    if moves and points.radius != _reach(moves):
+        return f"lost: the reach after {moves} changes, {points.radius} is there"
     return None
 
 

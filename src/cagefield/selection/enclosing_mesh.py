@@ -4,7 +4,7 @@ The selected positions fill cells of an even grid of edge h. The distance of the
 to the nearest filled one is interpolated by marching cubes. Its value at a position p in the cell with center
 c is at most sqrt(|p - c|^2 + sum_a u_a (1 - u_a) h^2) <= sqrt(3/2) h, by Jensen's inequality: a level above
 that encloses every position. Decimation may cut convex corners, so the result is checked, and built again
-with a larger level where a position is outside.
+with a larger level where a position is outside or the mesh crosses itself.
 
 Source: Lewiner et al., "Efficient Implementation of Marching Cubes' Cases with Topological Guarantees"
 (2003), implemented by scikit-image.
@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.errors import CagefieldError
+from cagefield.errors import CageError, CagefieldError
 from cagefield.geometry.mesh_cage import MeshCage
-from cagefield.geometry.triangle_mesh import encloses
+from cagefield.geometry.triangle_mesh import check_crossings, encloses
 from cagefield.selection.mesh_decimation import decimate
 from cagefield.typing import Array
 
@@ -37,7 +37,7 @@ ENCLOSING_LEVEL = 1.25
 """Minimum level in edges of the grid, above sqrt(3/2)."""
 
 LEVEL_STEP = 1.15
-"""Growth of the level where a position is outside of the decimated mesh."""
+"""Growth of the level where a position is outside of the decimated mesh, or that crosses itself."""
 
 MAX_ATTEMPTS = 8
 
@@ -88,11 +88,12 @@ def cage_mesh(points: Array, margin: float, *, max_faces: int = MAX_FACES) -> Ca
                 f"{max_faces} faces are too few for a closed mesh around this selection; allow {len(faces)} "
                 "or more, or select fewer separate parts"
             )
-        if encloses(vertices, faces, tested).all():
+        if encloses(vertices, faces, tested).all() and not _crosses_itself(vertices, faces):
             return CageMesh(vertices, faces, level)
         level *= LEVEL_STEP
     raise CagefieldError(
-        f"no mesh of {max_faces} faces encloses this selection; allow more faces, or select fewer parts"
+        f"no mesh of {max_faces} faces encloses this selection without crossing itself; allow more faces, or "
+        "select fewer parts"
     )
 
 
@@ -100,6 +101,15 @@ def mesh_cage_around(points: Array, margin: float, max_faces: int = MAX_FACES) -
     """The `cage_mesh` around points [N,3] as the inner cage of an edit; raises as that."""
     mesh = cage_mesh(points, margin, max_faces=max_faces)
     return MeshCage(mesh.vertices, mesh.faces)
+
+
+def _crosses_itself(vertices: Array, faces: NDArray[np.int32]) -> bool:
+    """True for a mesh that no cage may have: collapses of edges can take parts through each other."""
+    try:
+        check_crossings(vertices, faces)
+    except CageError:
+        return True
+    return False
 
 
 def _level_set(p: Array, edge: float, level: float) -> tuple[Array, NDArray[np.int32]]:
