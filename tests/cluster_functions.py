@@ -7,6 +7,7 @@ import signal
 from collections.abc import Collection
 from pathlib import Path
 from typing import NoReturn
+from unittest.mock import patch
 
 from cagefield.cameras.camera import Camera
 from cagefield.cluster.frame_tasks import FrameJob, FrameResult, render_frame
@@ -51,7 +52,7 @@ def frame_amid_kills(
         raise AssertionError("SIGKILL cannot be handled")
 
     if name in names and _is_first_try(marks / name):
-        frame_tasks.write_pictures = write_and_die
+        patch.object(frame_tasks, "write_pictures", write_and_die).start()
     return render_frame(job, camera, name, scale)
 
 
@@ -77,15 +78,14 @@ def training_amid_kills(marks: Path, names: Collection[str], job: BlockJob) -> b
             mark.write_text(str(run.step))
         advance(run)
 
-    if job.name in names:
-        first = _is_first_try(mark)
-        SplatRun.advance = advance_and_die if first else note_and_advance  # type: ignore[method-assign]
-        if first:
-            loop._checkpoint_interval_seconds = lambda saved: 0.0
-    try:
+    if job.name not in names:
         return train_block(job)
-    finally:
-        SplatRun.advance = advance  # type: ignore[method-assign]
+    if _is_first_try(mark):
+        patch.object(loop, "_checkpoint_interval_seconds", lambda saved: 0.0).start()
+        patch.object(SplatRun, "advance", advance_and_die).start()
+        return train_block(job)
+    with patch.object(SplatRun, "advance", note_and_advance):
+        return train_block(job)
 
 
 def _is_first_try(mark: Path) -> bool:

@@ -7,8 +7,12 @@ from __future__ import annotations
 
 import importlib.util
 import pickle
+import signal
+from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,6 +31,7 @@ from cagefield.scene.frames import FrameOptions, FrameRenderer
 from certificates import certificate_of_localhost
 from cluster_functions import cubed, frame_amid_kills
 from commands import printed, refused
+from plenoctree_files import plenoctree_arrays, write_plenoctree
 from scenes import ball_cameras, ball_scene, files_of
 
 needs_dask = pytest.mark.skipif(
@@ -73,6 +78,81 @@ def test_frames_of_a_cluster_that_loses_workers_are_those_of_one_process(
     assert len(expected) == 4 * 6 * (workers - 1) and files_of(tmp_path / "many") == expected
     lost = "1 worker was lost" if len(names) == 1 else f"{len(names)} workers were lost"
     assert lost in capsys.readouterr().err
+
+
+@pytest.mark.nightly
+@needs_dask
+def test_workers_that_see_no_folder_are_sent_the_scene_and_return_the_files(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As of another machine: neither scene folder nor mark; a worker is killed, and sent the scene again."""
+    from cagefield.cluster import frame_cluster
+
+    options = ["--turntable", 4, "--size", "32x24", "--depth"]
+    run("render", scene, "-o", tmp_path / "one", *options)
+    here = SceneSource.read(scene)
+    elsewhere = SceneSource(tmp_path / "not there", here.digest)
+    packed = SceneArchive.packed(here, Scene.open(scene))
+    packed.source = elsewhere
+    sent: list[SceneSource] = []
+
+    def archive_of(source: SceneSource, opened: Scene) -> SceneArchive:
+        sent.append(source)
+        return packed
+
+    def job_without_mark(*args: Any) -> FrameJob:
+        return replace(FrameJob(*args), mark="not there")
+
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    monkeypatch.setattr(SceneSource, "read", lambda folder: elsewhere)
+    monkeypatch.setattr(SceneArchive, "packed", archive_of)
+    monkeypatch.setattr(frame_cluster, "FrameJob", job_without_mark)
+    monkeypatch.setattr(frame_cluster, "render_frame", partial(frame_amid_kills, marks, ("0001",)))
+    run("render", scene, "-o", tmp_path / "many", *options, "--cluster", 2)
+    assert sent == [elsewhere] and [path.name for path in marks.iterdir()] == ["0001"]
+    assert files_of(tmp_path / "many") == files_of(tmp_path / "one")
+    assert "1 worker was lost" in capsys.readouterr().err
+
+
+@pytest.mark.nightly
+@needs_dask
+def test_an_interrupt_cancels_the_others_and_keep_adds_them(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C after the second frame: files that are there are whole, no worker goes on."""
+    from cagefield.cluster.frame_cluster import FrameCluster
+
+    options = ["--turntable", 6, "--size", "32x24", "--depth"]
+    run("render", scene, "-o", tmp_path / "one", *options)
+    expected, many = files_of(tmp_path / "one"), tmp_path / "many"
+    render = FrameCluster.render
+
+    def pressed(self: FrameCluster, *args: object) -> Iterator[object]:
+        for count, frame in enumerate(render(self, *args)):  # type: ignore[arg-type]
+            yield frame
+            if count == 1:
+                signal.raise_signal(signal.SIGINT)
+
+    words = ["render", scene, "-o", many, *options, "--keep", "--cluster", 2]
+    with monkeypatch.context() as patched:
+        patched.setattr(FrameCluster, "render", pressed)
+        assert main([str(word) for word in words]) == 130
+    found = files_of(many)
+    assert 0 < len(found) < len(expected) and found.items() <= expected.items()
+    run(*words)
+    assert files_of(many) == expected
+
+
+@pytest.mark.nightly
+@needs_dask
+def test_exact_frames_of_an_imported_field(tmp_path: Path) -> None:
+    file = write_plenoctree(tmp_path / "a.npz", plenoctree_arrays())
+    run("import", file, "-o", tmp_path / "scene", "--resolution", 8, "--compare", 0)
+    options = ["--exact", "--turntable", 2, "--size", "8x6"]
+    run("render", tmp_path / "scene", "-o", tmp_path / "one", *options)
+    run("render", tmp_path / "scene", "-o", tmp_path / "many", *options, "--cluster", 1)
+    assert files_of(tmp_path / "many") == files_of(tmp_path / "one")
 
 
 @pytest.mark.nightly
