@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import importlib.util
 import pickle
-import signal
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
@@ -132,7 +131,7 @@ def test_an_interrupt_cancels_the_others_and_keep_adds_them(
         for count, frame in enumerate(render(self, *args)):  # type: ignore[arg-type]
             yield frame
             if count == 1:
-                signal.raise_signal(signal.SIGINT)
+                raise KeyboardInterrupt
 
     words = ["render", scene, "-o", many, *options, "--keep", "--cluster", 2]
     with monkeypatch.context() as patched:
