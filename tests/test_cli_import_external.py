@@ -44,7 +44,7 @@ def file(program: str, tmp_path: Path) -> Path:
 def test_the_command_makes_a_scene(
     file: Path, program: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out = printed(capsys, "import", file, "-o", tmp_path / "scene", "--resolution", 8, "--compare", 0)
+    out = printed(capsys, "import", file, "-o", tmp_path / "scene", "--resolution", 16, "--compare", 0)
     assert out.startswith(program) and out.endswith(f"scene written to {tmp_path / 'scene'}\n")
     assert Scene.open(tmp_path / "scene").cameras["test"]
 

@@ -147,7 +147,7 @@ def test_an_interrupt_cancels_the_others_and_keep_adds_them(
 @needs_dask
 def test_exact_frames_of_an_imported_field(tmp_path: Path) -> None:
     file = write_plenoctree(tmp_path / "a.npz", plenoctree_arrays())
-    run("import", file, "-o", tmp_path / "scene", "--resolution", 8, "--compare", 0)
+    run("import", file, "-o", tmp_path / "scene", "--resolution", 16, "--compare", 0)
     options = ["--exact", "--turntable", 2, "--size", "8x6"]
     run("render", tmp_path / "scene", "-o", tmp_path / "one", *options)
     run("render", tmp_path / "scene", "-o", tmp_path / "many", *options, "--cluster", 1)
