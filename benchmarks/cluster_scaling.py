@@ -31,6 +31,9 @@ from cagefield.cli import main as cagefield
 
 VIDEO_FRAMES, CITY_BLOCKS, MACHINES = 10_000, 200, 50
 RUNS = 2
+UNSOLVED = (
+    "The runs are too short to tell a frame's time from the start's on this machine; give more --frames."
+)
 
 
 def main() -> None:
@@ -69,6 +72,11 @@ def scaling(options: argparse.Namespace) -> list[str]:
     frame = (seconds[1] - few) / (options.frames - options.frames // 4)
     start = seconds[1] - options.frames * frame
     working = {workers: total - start for workers, total in seconds.items()}
+    solved = frame > 0.0 and min(working.values()) > 0.0
+    shown = {
+        workers: f"{spent:.1f} | {working[1] / spent:.2f}" if solved else " | "
+        for workers, spent in working.items()
+    }
     return [
         "# Frames on local workers",
         "",
@@ -78,14 +86,11 @@ def scaling(options: argparse.Namespace) -> list[str]:
         "| workers | all, s | without the start, s | speed-up |",
         "| --- | --- | --- | --- |",
         f"| none, one process | {alone:.1f} | | |",
-        *(
-            f"| {workers} | {total:.1f} | {working[workers]:.1f} | {working[1] / working[workers]:.2f} |"
-            for workers, total in seconds.items()
-        ),
+        *(f"| {workers} | {total:.1f} | {shown[workers]} |" for workers, total in seconds.items()),
         "",
         "## Estimates",
         "",
-        video(start, frame),
+        video(max(0.0, start), frame) if solved else UNSOLVED,
     ]
 
 

@@ -542,6 +542,11 @@ def test_bench_edits_refuses_before_it_works(capsys: pytest.CaptureFixture[str],
     assert "size is 4; it must be at least 16" in refused(capsys, *new, "--size", 4)
     assert "--picture-size is 0" in refused(capsys, *new, "--picture-size", 0)
     assert "give --pictures FOLDER" in refused(capsys, *new, "--only-pictures")
+    assert "belongs to --cluster" in refused(capsys, *new, "--cluster-tls", "a", "b", "c")
+    assert "give --no-methods with --cluster" in refused(capsys, *new, "--cluster", 2)
+    assert "'0' is no cluster" in refused(capsys, *new, "--cluster", 0, "--no-methods")
+    drawn = ["--pictures", tmp_path / "p", "--only-pictures", "--no-methods"]
+    assert "draws on one machine" in refused(capsys, *new, *drawn, "--cluster", 2)
     assert files_of(tmp_path) == before
 
 

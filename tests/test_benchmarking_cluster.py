@@ -14,6 +14,7 @@ from benchmarks.edits.edit_quality import measure
 from benchmarks.edits.edits_cluster import measure_on
 
 from benchmark_settings import TINY
+from commands import printed
 
 pytestmark = [
     pytest.mark.nightly,
@@ -34,4 +35,21 @@ def test_scores_of_a_cluster_are_those_of_one_process(tmp_path: Path) -> None:
     for score, expected in zip(found, measure(cases, bench), strict=True):
         # figures that a case does not have are NaN
         np.testing.assert_equal(asdict(score.figures), asdict(expected.figures))
-        np.testing.assert_equal(asdict(score.revealed), asdict(expected.revealed))
+        revealed = [None if one.revealed is None else asdict(one.revealed) for one in (score, expected)]
+        np.testing.assert_equal(*revealed)
+
+
+def test_the_command_prints_the_scores_of_one_process(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [
+        "bench", "edits", "--scenes", "chair", "--edits", "delete_back", "--views", 8, "--size", 32,
+        "--test-views", 3, "--steps", 60, "--resolution", 24, "--workdir", tmp_path / "work", "--no-methods",
+    ]  # fmt: skip
+    many = printed(capsys, *words, "-o", tmp_path / "many.md", "--cluster", 2)
+    one = printed(capsys, *words, "-o", tmp_path / "one.md")
+    (line,) = [line for line in one.splitlines() if line.startswith("chair, delete_back: PSNR ")]
+    assert line in many.splitlines() and "chair: done" in many
+    texts = [(tmp_path / name).read_text(encoding="utf-8") for name in ("one.md", "many.md")]
+    assert [text.count("| chair | delete back |") for text in texts] == [1, 1]
+    assert texts[0].count("--cluster") == texts[1].count("--cluster") == 0

@@ -6,11 +6,12 @@ The oracle is the command without a cluster: all files, byte for byte.
 from __future__ import annotations
 
 import importlib.util
-import os
 import pickle
-import signal
 from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,13 +20,17 @@ from cagefield import Cage, Edit, EditStack, Scene
 from cagefield.cameras.camera import Camera
 from cagefield.cli import main
 from cagefield.cli.frame_files import FrameFiles, parse_frames
+from cagefield.cluster import connection
 from cagefield.cluster.connection import TlsFiles, connect, parse_cluster
 from cagefield.cluster.frame_tasks import FrameJob, render_frame, write_contents
 from cagefield.cluster.scene_archive import SceneArchive, SceneSource, content_digest
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.images.pictures import has_pictures
 from cagefield.scene.frames import FrameOptions, FrameRenderer
+from certificates import certificate_of_localhost
+from cluster_functions import cubed, frame_amid_kills
 from commands import printed, refused
+from plenoctree_files import plenoctree_arrays, write_plenoctree
 from scenes import ball_cameras, ball_scene, files_of
 
 needs_dask = pytest.mark.skipif(
@@ -49,55 +54,130 @@ def run(*argv: object) -> None:
 
 @pytest.mark.nightly
 @needs_dask
-def test_frames_of_a_cluster_that_loses_a_worker_are_those_of_one_process(
+@pytest.mark.parametrize(("workers", "names"), [(2, ("0002",)), (3, ("0005", "0010"))])
+def test_frames_of_a_cluster_that_loses_workers_are_those_of_one_process(
+    scene: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    workers: int,
+    names: tuple[str, ...],
+) -> None:
+    """Each frame of `names` has its worker killed amid its files, at its first try."""
+    from cagefield.cluster import frame_cluster
+
+    options = ["--turntable", 6 * (workers - 1), "--size", "32x24", "--depth", "--normals", "--compare"]
+    run("render", scene, "-o", tmp_path / "one", *options)
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    monkeypatch.setattr(frame_cluster, "render_frame", partial(frame_amid_kills, marks, names))
+    run("render", scene, "-o", tmp_path / "many", *options, "--cluster", workers)
+    assert {path.name for path in marks.iterdir()} == set(names)
+    expected = files_of(tmp_path / "one")
+    assert len(expected) == 4 * 6 * (workers - 1) and files_of(tmp_path / "many") == expected
+    lost = "1 worker was lost" if len(names) == 1 else f"{len(names)} workers were lost"
+    assert lost in capsys.readouterr().err
+
+
+@pytest.mark.nightly
+@needs_dask
+def test_workers_that_see_no_folder_are_sent_the_scene_and_return_the_files(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Depth, before and after, an orbit of 6; a worker is killed once two frames are there, amid others."""
-    options = ["--turntable", 6, "--size", "32x24", "--depth", "--compare"]
+    """As of another machine: neither scene folder nor mark; a worker is killed, and sent the scene again."""
+    from cagefield.cluster import frame_cluster
+
+    options = ["--turntable", 4, "--size", "32x24", "--depth"]
     run("render", scene, "-o", tmp_path / "one", *options)
-    killed = kill_after(monkeypatch, frames=2, times=1)
+    here = SceneSource.read(scene)
+    elsewhere = SceneSource(tmp_path / "not there", here.digest)
+    packed = SceneArchive.packed(here, Scene.open(scene))
+    packed.source = elsewhere
+    sent: list[SceneSource] = []
+
+    def archive_of(source: SceneSource, opened: Scene) -> SceneArchive:
+        sent.append(source)
+        return packed
+
+    def job_without_mark(*args: Any) -> FrameJob:
+        return replace(FrameJob(*args), mark="not there")
+
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    monkeypatch.setattr(SceneSource, "read", lambda folder: elsewhere)
+    monkeypatch.setattr(SceneArchive, "packed", archive_of)
+    monkeypatch.setattr(frame_cluster, "FrameJob", job_without_mark)
+    monkeypatch.setattr(frame_cluster, "render_frame", partial(frame_amid_kills, marks, ("0001",)))
     run("render", scene, "-o", tmp_path / "many", *options, "--cluster", 2)
-    assert len(killed) == 1
-    expected = files_of(tmp_path / "one")
-    assert len(expected) == 18 and files_of(tmp_path / "many") == expected
+    assert sent == [elsewhere] and [path.name for path in marks.iterdir()] == ["0001"]
+    assert files_of(tmp_path / "many") == files_of(tmp_path / "one")
     assert "1 worker was lost" in capsys.readouterr().err
 
 
-@needs_dask
 @pytest.mark.nightly
-def test_two_kills_among_three_workers(
-    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@needs_dask
+def test_an_interrupt_cancels_the_others_and_keep_adds_them(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    options = ["--turntable", 24, "--size", "48x32", "--depth", "--normals", "--compare"]
-    run("render", scene, "-o", tmp_path / "one", *options)
-    killed = kill_after(monkeypatch, frames=5, times=2)
-    run("render", scene, "-o", tmp_path / "many", *options, "--cluster", 3)
-    assert len(set(killed)) == 2
-    assert files_of(tmp_path / "many") == files_of(tmp_path / "one")
-    assert "2 workers were lost" in capsys.readouterr().err
-
-
-def kill_after(monkeypatch: pytest.MonkeyPatch, *, frames: int, times: int) -> list[int]:
-    """Kills a worker by SIGKILL after every `frames` frames; the processes that were killed."""
+    """Ctrl-C after the second frame: files that are there are whole, no worker goes on."""
     from cagefield.cluster.frame_cluster import FrameCluster
 
-    killed: list[int] = []
-    done = 0
+    options = ["--turntable", 6, "--size", "32x24", "--depth"]
+    run("render", scene, "-o", tmp_path / "one", *options)
+    expected, many = files_of(tmp_path / "one"), tmp_path / "many"
     render = FrameCluster.render
 
-    def killing(self: FrameCluster, *args: object) -> Iterator[object]:
-        nonlocal done
-        for frame in render(self, *args):  # type: ignore[arg-type]
+    def pressed(self: FrameCluster, *args: object) -> Iterator[object]:
+        for count, frame in enumerate(render(self, *args)):  # type: ignore[arg-type]
             yield frame
-            done += 1
-            if len(killed) < times and done >= frames * (len(killed) + 1):
-                processes = self.client.run(os.getpid, on_error="ignore")
-                victim = next(pid for pid in processes.values() if pid not in (*killed, os.getpid()))
-                os.kill(victim, signal.SIGKILL)
-                killed.append(victim)
+            if count == 1:
+                raise KeyboardInterrupt
 
-    monkeypatch.setattr(FrameCluster, "render", killing)
-    return killed
+    words = ["render", scene, "-o", many, *options, "--keep", "--cluster", 2]
+    with monkeypatch.context() as patched:
+        patched.setattr(FrameCluster, "render", pressed)
+        assert main([str(word) for word in words]) == 130
+    found = files_of(many)
+    assert 0 < len(found) < len(expected) and found.items() <= expected.items()
+    run(*words)
+    assert files_of(many) == expected
+
+
+@pytest.mark.nightly
+@needs_dask
+def test_exact_frames_of_an_imported_field(tmp_path: Path) -> None:
+    file = write_plenoctree(tmp_path / "a.npz", plenoctree_arrays())
+    run("import", file, "-o", tmp_path / "scene", "--resolution", 16, "--compare", 0)
+    options = ["--exact", "--turntable", 2, "--size", "8x6"]
+    run("render", tmp_path / "scene", "-o", tmp_path / "one", *options)
+    run("render", tmp_path / "scene", "-o", tmp_path / "many", *options, "--cluster", 1)
+    assert files_of(tmp_path / "many") == files_of(tmp_path / "one")
+
+
+@pytest.mark.nightly
+@needs_dask
+def test_encrypted_connections(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Local workers over TLS; neither an unencrypted client nor one with another certificate gets in."""
+    cert, key = certificate_of_localhost(tmp_path)
+    options = ["--turntable", 2, "--size", "32x24"]
+    run("render", scene, "-o", tmp_path / "one", *options)
+    run("render", scene, "-o", tmp_path / "tls", *options, "--cluster", 1, "--cluster-tls", cert, cert, key)
+    assert files_of(tmp_path / "tls") == files_of(tmp_path / "one")
+    (tmp_path / "other").mkdir()
+    other, other_key = certificate_of_localhost(tmp_path / "other")
+    files = TlsFiles(cert, cert, key)
+    with connect(1, files) as client:
+        address = client.scheduler.address
+        assert address.startswith("tls://127.0.0.1:")
+        with connect(address, files) as second:
+            assert second.submit(cubed, 3).result() == 27
+        monkeypatch.setattr(connection, "CONNECT_SECONDS", 3.0)
+        for bad, tls in (
+            (address.replace("tls:", "tcp:"), None),
+            (address, TlsFiles(other, other, other_key)),
+        ):
+            with pytest.raises(CagefieldError, match="no scheduler replies"), connect(bad, tls):
+                pass
 
 
 def test_kept_frames_stay_and_the_others_are_added(

@@ -6,10 +6,10 @@ The oracle is the command without a cluster; trainings of given steps on a CPU a
 from __future__ import annotations
 
 import importlib.util
-import os
 import shutil
 import signal
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -21,6 +21,7 @@ from cagefield.cli.train import Train
 from cagefield.cli.train_captures import capture_name, train_capture
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
+from cluster_functions import KILL_STEP, training_amid_kills
 from commands import given_up, refused
 from splat_scenes import assert_same_splats
 
@@ -52,47 +53,17 @@ def field_of(scene: Path) -> SplatField:
 def test_blocks_of_a_cluster_are_those_of_one_process(
     street: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A worker is killed amid the blocks, once one has a checkpoint; another one goes on from there."""
-    from cagefield.cluster import tasks
+    """Workers are killed amid a block and amid a refinement; others go on from their checkpoints."""
+    from cagefield.training.splats import train_blocks
 
     options = ("--blocks", 2)
-    assert train(street, tmp_path / "one", *options, steps=800) == 0
-    killed: list[int] = []
-    connect = tasks.connect
-
-    class Killing:
-        """Context of `connect` that kills a worker as soon as a block's checkpoint is there, once."""
-
-        def __init__(self, *args: object) -> None:
-            self.inner = connect(*args)  # type: ignore[arg-type]
-            self.ended = False
-
-        def __enter__(self) -> object:
-            import threading
-
-            client = self.inner.__enter__()
-            workers = [info["name"] for info in client.scheduler_info()["workers"].values()]
-            assert len(workers) == 2
-            self.processes = list(client.run(os.getpid).values())
-            threading.Thread(target=self.kill, daemon=True).start()
-            return client
-
-        def kill(self) -> None:
-            import time
-
-            while not self.ended and not killed:
-                if list((tmp_path / "many.blocks").glob("block-*.training")):
-                    os.kill(self.processes[0], signal.SIGKILL)
-                    killed.append(self.processes[0])
-                time.sleep(0.02)
-
-        def __exit__(self, *args: object) -> object:
-            self.ended = True
-            return self.inner.__exit__(*args)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(tasks, "connect", Killing)
-    assert train(street, tmp_path / "many", *options, "--cluster", 2, steps=800) == 0
-    assert len(killed) == 1 and "1 worker was lost" in capsys.readouterr().err
+    assert train(street, tmp_path / "one", *options, steps=200) == 0
+    marks, names = tmp_path / "marks", ("block 1", "block 2, refinement")
+    marks.mkdir()
+    monkeypatch.setattr(train_blocks, "train_block", partial(training_amid_kills, marks, names))
+    assert train(street, tmp_path / "many", *options, "--cluster", 2, steps=200) == 0
+    assert {path.name: path.read_text() for path in marks.iterdir()} == dict.fromkeys(names, str(KILL_STEP))
+    assert "1 worker was lost" in capsys.readouterr().err
     assert_same_splats(field_of(tmp_path / "many"), field_of(tmp_path / "one"))
     assert not (tmp_path / "many.blocks").exists()
 

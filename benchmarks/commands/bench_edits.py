@@ -83,6 +83,8 @@ class BenchEdits:
     cluster: str | None = None
     """Train and measure on a cluster of dask.distributed, as `cagefield render`; the work folder is shared by
     its machines. Frame times are then those of several processes at once."""
+    cluster_tls: tuple[Path, Path, Path] | None = None
+    """CA CERT KEY: PEM files for the connections to and in the cluster."""
     overwrite: Flag = False
     """Replace files that are there."""
 
@@ -98,8 +100,7 @@ class BenchEdits:
         check_known(self.methods)
         if self.field != "nerf" and self.preset != "auto":
             raise CagefieldError("--preset is for the original NeRF; give --field nerf too")
-        if self.cluster is not None and not self.no_methods:
-            raise CagefieldError("methods are compared on one machine; give --no-methods with --cluster")
+        self._check_cluster()
         if self.field != "voxel" and not self.no_methods:
             raise CagefieldError(
                 f"methods are compared on voxels only; give --no-methods with --field {self.field}"
@@ -136,6 +137,20 @@ class BenchEdits:
             if self.pictures is not None:
                 self._draw(cases, bench, self.pictures)
 
+    def _check_cluster(self) -> None:
+        if self.cluster is None:
+            if self.cluster_tls is not None:
+                raise CagefieldError("--cluster-tls belongs to --cluster; give both or neither")
+            return
+        from cagefield.cluster.connection import check_installed, parse_cluster
+
+        if not self.no_methods:
+            raise CagefieldError("methods are compared on one machine; give --no-methods with --cluster")
+        if self.only_pictures:
+            raise CagefieldError("--only-pictures draws on one machine; leave out --cluster")
+        parse_cluster(self.cluster)
+        check_installed()
+
     def _config(self) -> VoxelConfig | NerfConfig | SplatConfig:
         """The trainer's configuration."""
         if self.field == "nerf":
@@ -158,10 +173,11 @@ class BenchEdits:
         scores, measured = [], measure(cases, bench, taught=self.taught)
         if self.cluster is not None:
             from benchmarks.edits.edits_cluster import measure_on
-            from cagefield.cluster.connection import parse_cluster
+            from cagefield.cluster.connection import TlsFiles, parse_cluster
 
+            tls = None if self.cluster_tls is None else TlsFiles(*self.cluster_tls)
             measured = measure_on(
-                parse_cluster(self.cluster), cases, bench, taught=self.taught, device=self.device
+                parse_cluster(self.cluster), cases, bench, taught=self.taught, device=self.device, tls=tls
             )
         for score in measured:
             scores.append(score)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _SILENT = (
     "workdir", "out", "pictures", "picture_size", "picture_views", "edit_pictures", "error_panel",
-    "overwrite", "scene_out", "cluster",
+    "overwrite", "scene_out", "cluster", "cluster_tls",
 )  # fmt: skip
 
 

@@ -13,12 +13,19 @@ from benchmarks.common.cases import Case, chosen
 from benchmarks.common.workbench import Settings, Workbench
 from benchmarks.edits.edit_quality import measure
 from benchmarks.edits.edits_table import Score
+from cagefield.cluster.connection import TlsFiles
 from cagefield.cluster.tasks import Task, run_tasks
 from cagefield.errors import CagefieldError
 
 
 def measure_on(
-    cluster: int | str, cases: Sequence[Case], bench: Workbench, *, taught: bool = False, device: str = "auto"
+    cluster: int | str,
+    cases: Sequence[Case],
+    bench: Workbench,
+    *,
+    taught: bool = False,
+    device: str = "auto",
+    tls: TlsFiles | None = None,
 ) -> Iterator[Score]:
     """The scores of `edit_quality.measure`, in the order of the cases.
 
@@ -30,7 +37,7 @@ def measure_on(
         f"training {name}": Task(train_scene, (bench.settings, bench.folder.absolute(), name, bench.retrain))
         for name in scenes
     }
-    for name, _ in run_tasks(cluster, trainings, device=device):
+    for name, _ in run_tasks(cluster, trainings, device=device, tls=tls):
         print(f"{name}: done", flush=True)
     arguments = bench.settings, bench.folder.absolute()
     tasks = {
@@ -39,7 +46,7 @@ def measure_on(
     }
     known = dict(zip(tasks, cases, strict=True))
     waiting, found = list(tasks), {}
-    for name, score in run_tasks(cluster, tasks, device=device):
+    for name, score in run_tasks(cluster, tasks, device=device, tls=tls):
         found[name] = dataclasses.replace(score, case=known[name])
         while waiting and waiting[0] in found:
             yield found.pop(waiting.pop(0))

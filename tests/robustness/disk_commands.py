@@ -39,7 +39,7 @@ def sources(folder: Path) -> None:
     (folder / "path.json").write_text(dump_path(keys, loop=False))
     make_scene("chair", folder / "photos", views=4, size=16, test_views=1)
     photos_alone(folder / "photos_alone")
-    write_street(folder / "street", photos=8, size=48, length=4.0)
+    write_street(folder / "street", photos=12, size=96, length=5.0)
     if importlib.util.find_spec("torch") is not None:
         write_checkpoints(folder, splats=4000)
     (folder / "e.yaml").write_text(EDITS)

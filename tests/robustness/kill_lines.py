@@ -157,7 +157,7 @@ def _trained(field: str) -> Command:
 
 def _put_street(folder: Path) -> None:
     put_scene(folder)
-    write_street(folder / "street", photos=8, size=48, length=4.0)
+    write_street(folder / "street", photos=12, size=96, length=5.0)
 
 
 def _train_blocks(folder: Path, say: Say) -> None:

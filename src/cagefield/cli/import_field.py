@@ -28,7 +28,8 @@ class ImportField:
     """
 
     file: tyro.conf.Positional[Path]
-    """Splats, or a checkpoint: splatfacto, nerfacto, nerf-pytorch, TensoRF, Instant-NGP, svox2 or svox."""
+    """Splats, or a checkpoint of splatfacto, nerfacto, nerf-pytorch, TensoRF, Instant-NGP, svox2, svox or
+    SVRaster."""
     out: Output
     """Scene folder."""
     data: Path | None = None
@@ -78,6 +79,7 @@ class ImportField:
 
         if self.config is not None or self.fov_deg is not None:
             raise CagefieldError("--config and --fov-deg are for NeRFs; leave them out for splats")
+        self._check_data_scale(False)
         imported = import_splats(
             read_splats(self.file, self.axes, time_code=self.time_code),
             self.up,
@@ -101,6 +103,8 @@ class ImportField:
 
         if self.up != "y-down" or self.unbounded != "auto" or self.axes is not None:
             raise CagefieldError("--up, --axes and --unbounded are for splats; leave them out for a NeRF")
+        if self.time_code is not None:
+            raise CagefieldError("--time-code is for splats of a USD file; leave it out for a NeRF")
         found = read_external(self.file, self.config)
         return self._nerf() if found is None else self._external(found)
 
@@ -114,6 +118,7 @@ class ImportField:
 
         if self.fov_deg is not None:
             raise CagefieldError("--fov-deg is for a nerf-pytorch trained in NDC; leave it out here")
+        self._check_data_scale(isinstance(found.field, VoxelField))
         if self.data_scale is not None:
             found = with_data_scale(found, self.data_scale)
         cameras = cameras_of(found, self._dataset())
@@ -134,6 +139,7 @@ class ImportField:
         from cagefield.formats.nerf.nerf_pytorch_config import SamplingSettings, find_config, read_config
         from cagefield.scene.import_nerf_pytorch import import_nerf
 
+        self._check_data_scale(False)
         found = read_checkpoint(self.file)
         config = self.config or find_config(self.file)
         settings = SamplingSettings() if config is None else read_config(config)
@@ -149,6 +155,10 @@ class ImportField:
         )
         sampling = f"sampling: {config if config else 'no config found, as for Blender scenes'}"
         return scene, f"{found}\n{sampling}\n{figures}"
+
+    def _check_data_scale(self, is_svox2: bool) -> None:
+        if self.data_scale is not None and not is_svox2:
+            raise CagefieldError("--data-scale is for a grid of svox2; leave it out here")
 
     def _dataset(self) -> Dataset | None:
         from cagefield.datasets import load_dataset

@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 LOCAL_WORKERS_HOST = "127.0.0.1"
 MAX_LOCAL_WORKERS = 256
 CONNECT_SECONDS = 30.0
-"""Time that a scheduler and its first worker are waited for."""
+"""Time that a scheduler elsewhere and its first worker are waited for."""
+LOCAL_CONNECT_SECONDS = 600.0
+"""The same time for local workers, on a machine that may be busy."""
 
 
 @dataclass(frozen=True)
@@ -122,8 +124,16 @@ def _local_workers(count: int, security: Security | None) -> Iterator[LocalClust
     import dask
     from distributed import LocalCluster
 
-    # A kernel's launch holds the interpreter to its end: a busy worker may not answer for minutes.
-    settings = {"distributed.scheduler.worker-ttl": None, "distributed.comm.timeouts.connect": "120s"}
+    # A kernel's launch holds the interpreter to its end: a busy worker may not answer for minutes. One that
+    # was killed is started again, which takes a busy machine longer than the 15 s after which dask would
+    # give it up for good.
+    settings: dict[str, Any] = {
+        "distributed.scheduler.worker-ttl": None,
+        "distributed.comm.timeouts.connect": "120s",
+        "distributed.deploy.lost-worker-timeout": "365d",
+        "distributed.scheduler.http.routes": [],
+        "distributed.worker.http.routes": [],
+    }
     with (
         TemporaryFolder("cluster") as scratch,
         dask.config.set(settings),
@@ -132,7 +142,8 @@ def _local_workers(count: int, security: Security | None) -> Iterator[LocalClust
             threads_per_worker=1,
             processes=True,
             host=LOCAL_WORKERS_HOST,
-            dashboard_address=None,
+            dashboard_address=f"{LOCAL_WORKERS_HOST}:0",  # None is the port 8787, which another one may have
+            scheduler_kwargs={"dashboard": False},
             memory_limit=0,
             local_directory=str(scratch),
             security=security,
@@ -146,7 +157,8 @@ def _local_workers(count: int, security: Security | None) -> Iterator[LocalClust
 def _client(cluster: int | str, local: Any, security: Security | None) -> Iterator[Client]:
     from distributed import Client
 
-    options: dict[str, Any] = {"timeout": CONNECT_SECONDS, "security": security, "set_as_default": False}
+    seconds = CONNECT_SECONDS if local is None else LOCAL_CONNECT_SECONDS
+    options: dict[str, Any] = {"timeout": seconds, "security": security, "set_as_default": False}
     try:
         if local is not None:
             client = Client(local, **options)
@@ -161,7 +173,7 @@ def _client(cluster: int | str, local: Any, security: Security | None) -> Iterat
         raise CagefieldError(f"no scheduler replies at {cluster} ({reason}); check address and TLS") from None
     with client:
         try:
-            client.wait_for_workers(1, timeout=CONNECT_SECONDS)
+            client.wait_for_workers(1, timeout=seconds)
         except TimeoutError:
             raise CagefieldError(f"cluster {cluster} has no workers; start some with `dask worker`") from None
         yield client

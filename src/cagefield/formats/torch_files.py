@@ -30,9 +30,7 @@ def read_torch_tensors(path: Path) -> dict[str, Any]:
     except UnreadableError as error:
         raise FieldError(f"{path}: {error}") from None
     except OSError:
-        raise FieldError(
-            f"{path}: no such checkpoint; give the .tar or .ckpt file that the training wrote"
-        ) from None
+        raise FieldError(f"{path}: no such checkpoint; give the file that the training wrote") from None
     try:
         import torch
     except ImportError as error:
@@ -55,7 +53,7 @@ def read_torch_tensors(path: Path) -> dict[str, Any]:
         ) from error
     except Exception as error:  # damaged opcodes raise any exception
         # A truncated file has no message; an invalid opcode is a KeyError of its number.
-        reason = "" if isinstance(error, LookupError) else " ".join(str(error).split())[:120]
+        reason = "" if isinstance(error, LookupError) else " ".join(str(error).split()).split(". ")[0][:120]
         raise FieldError(
             f"{path}: not a readable checkpoint ({reason or 'no file of torch.save'}); it may be truncated, "
             "copy it again"

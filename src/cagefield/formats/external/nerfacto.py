@@ -64,7 +64,11 @@ def read_nerfacto(content: Mapping[str, Any], path: Path, config: Path | None) -
         raise FieldError(
             "a nerfacto checkpoint is read with its config.yml, which is not beside it; give it (--config)"
         )
-    settings = nerfacto_settings(read_config(config))
+    options = read_config(config)
+    try:
+        settings = nerfacto_settings(options)
+    except FieldError as error:
+        raise FieldError(f"{config}: {error}") from None
     tensors = {
         name: value
         for name, value in content["pipeline"].items()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -39,25 +40,36 @@ def read_external(path: Path | str, config: Path | None = None) -> ExternalCheck
     """Field of another program's checkpoint; None for a PyTorch file of none of them, as nerf-pytorch's.
 
     Raises:
-        FieldError: missing or damaged file, objects beside tensors and plain values (which are not
-            unpickled), missing or misshapen tensors, missing PyTorch.
+        FieldError: a config for another checkpoint than nerfacto's, missing or damaged file, objects
+            beside tensors and plain values (which are not unpickled), missing or misshapen tensors, missing
+            PyTorch.
     """
     path = Path(path)
+    if not os.path.exists(path):  # also where the name is too long for a file
+        raise FieldError(f"{path}: no such checkpoint; give the file that the training wrote")
     try:
         if is_instant_ngp(path):
+            _check_no_config(config)
             return read_instant_ngp(path)
         if path.suffix.lower() == ".npz":
+            _check_no_config(config)
             return _read_npz(path)
         content = read_torch_tensors(path)
         if is_nerfacto(content):
             return read_nerfacto(content, path, config)
         for test, reader in _TORCH:
             if test(content):
+                _check_no_config(config)
                 return reader(content)
     except FieldError as error:
         message = str(error)
         raise FieldError(message if message.startswith(str(path)) else f"{path}: {message}") from None
     return None
+
+
+def _check_no_config(config: Path | None) -> None:
+    if config is not None:
+        raise FieldError(f"a checkpoint of this program holds its options; leave out the config {config}")
 
 
 def _read_npz(path: Path) -> ExternalCheckpoint:

@@ -17,6 +17,7 @@ from cagefield.files.safe_open import open_regular, read_bytes
 
 META, LOD_META = "meta.json", "lod-meta.json"
 
+EMPTY_FILE = "an empty file"
 ZIP_ARCHIVE = "a zip archive without meta.json; unpack it"
 """Description of another zip archive; PyTorch checkpoints are such archives too."""
 
@@ -81,7 +82,7 @@ def describe_other_file(path: Path) -> str | None:
         start = file.read(_START_BYTES)
     result = next((name for magic, name in _OTHER_TYPES if start.startswith(magic)), None)
     if result is None and not start:
-        return "an empty file"
+        return EMPTY_FILE
     if result is None and start.startswith(b"\x1f\x8b"):
         return "a gzip archive of something else than SPZ; unpack it"
     if result is None and start.startswith(b"PK\x03\x04"):

@@ -25,7 +25,14 @@ from cagefield.files.ply import open_ply
 from cagefield.files.safe_open import check_regular
 from cagefield.formats.splats.antimatter15_splat import open_splat_rows
 from cagefield.formats.splats.compressed_ply import open_compressed_ply
-from cagefield.formats.splats.detection import LOD_META, META, ZIP_ARCHIVE, describe_other_file, detect_format
+from cagefield.formats.splats.detection import (
+    EMPTY_FILE,
+    LOD_META,
+    META,
+    ZIP_ARCHIVE,
+    describe_other_file,
+    detect_format,
+)
 from cagefield.formats.splats.gltf import open_splat_gltf
 from cagefield.formats.splats.gltf_buffers import GltfAsset
 from cagefield.formats.splats.ksplat import open_ksplat
@@ -168,5 +175,7 @@ def _open_by_suffix(path: Path, ending: str) -> SplatSource:
         raise FieldError(f"{path}: {kind}, no splats; as a PLY, {POINT_CLOUD_CURE}")
     if ending and (kind is None or ending == ".ply"):
         return _OPEN[ending](path)  # the reader reports the problem
+    if kind == EMPTY_FILE:
+        raise FieldError(f"{path}: {kind}; copy it again")
     of = f" ({kind})" if kind else ""
     raise FieldError(f"{path}: no format of splats that is known{of}; these are: {', '.join(READABLE)}")
