@@ -119,7 +119,8 @@ def select(scene: Scene, elements: Elements, painted: Painted) -> Mask:
 
 def edit_of(elements: Elements, mask: Mask, painted: Painted) -> Edit:
     """The edit that moves the painted elements, its cage rounded to 1e-4 world units."""
-    points, radii = elements.positions[mask], elements.radii[mask]
+    points = elements.positions[mask].astype(np.float64)
+    radii = elements.radii[mask]
     cage = cage_around(painted.cage, points, painted.margin * elements.cell_edge, radii, faces=FACES)
     inner = rounded(cage, painted.pivot)
     edit = (
@@ -135,7 +136,7 @@ def rounded(cage: Cage, pivot: Vec3 | None = None) -> Cage:
     """A cage whose corners or vertices are whole multiples of 1e-4 world units."""
     if isinstance(cage, MeshCage):
         return MeshCage(cage.vertices.round(4), cage.triangles, pivot=pivot)
-    return Cage(cage.corners.round(4), pivot=pivot)
+    return Cage(cage.corners.round(4), pivot=cage.pivot if pivot is None else np.asarray(pivot, np.float64))
 
 
 def text_of(edits: EditStack, comments: Sequence[str]) -> str:

@@ -18,7 +18,6 @@ from scipy.spatial.transform import Rotation
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.edits import EditStack
 from cagefield.edits.edit_files import load_edits, parse_edits
-from cagefield.edits.kernel_map import KernelMap
 from cagefield.errors import CagefieldError, EditError
 from cagefield.fields.baking import bake
 from cagefield.fields.meshing import Mesh, extract_mesh
@@ -153,6 +152,8 @@ def scene_mesh(
     if isinstance(field, SplatField):
         source: SplatField | EditedField = replace(edited_splats(scene), bounds=bounds)
     else:
+        from cagefield.edits.kernel_map import KernelMap
+
         source = EditedField(field, KernelMap(scene.prepared_edits), bounds, scene.preserve_opacity)
     if resolution is None:
         resolution = int(np.clip((bounds[1] - bounds[0]).max() / field.sample_spacing + 1, 64, 384))

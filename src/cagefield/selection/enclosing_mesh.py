@@ -106,7 +106,7 @@ def mesh_cage_around(points: Array, margin: float, max_faces: int = MAX_FACES) -
 def _crosses_itself(vertices: Array, faces: NDArray[np.int32]) -> bool:
     """True for a mesh that no cage may have: collapses of edges can take parts through each other."""
     try:
-        check_crossings(vertices, faces)
+        check_crossings(vertices, faces.astype(np.int64))
     except CageError:
         return True
     return False

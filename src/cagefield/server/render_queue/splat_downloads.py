@@ -15,7 +15,6 @@ from cagefield.errors import CagefieldError
 from cagefield.exporting.path_frames import CameraPath
 from cagefield.fields.splat_field import SplatField
 from cagefield.files.temporary_folders import TemporaryFolder
-from cagefield.pages.page_nodes import COARSE_SPLATS
 from cagefield.scene.alignment import Alignment
 from cagefield.server.editor.document import Entry
 from cagefield.server.editor.persistence import SceneStore, stem_of
@@ -123,6 +122,8 @@ class Exports:
 
     def _check_levels(self) -> None:
         """Raises CagefieldError for a scene whose page has no levels of detail as files."""
+        from cagefield.pages.page_nodes import COARSE_SPLATS
+
         field = self._store.scene.field
         if not isinstance(field, SplatField):
             raise CagefieldError("the scene holds voxels, whose pages have levels already; choose a page")
