@@ -193,9 +193,9 @@ def test_hostile_configs_are_refused(tmp_path: Path, text: str, message: str) ->
 
 @pytest.mark.parametrize("value", [10**400, -(10**400), float("inf"), float("nan"), 1e308])
 def test_numbers_beyond_all_floats_are_refused(value: float) -> None:
-    with pytest.raises(FieldError, match="near is .*; it must be from 0 to 100"):
+    with pytest.raises(FieldError, match=r"near is .*; it must be from 0 to 100"):
         number("near", value, 0.0, 100.0)
-    with pytest.raises(FieldError, match="levels is .*; it must be from 1 to 16"):
+    with pytest.raises(FieldError, match=r"levels is .*; it must be from 1 to 16"):
         whole_number("levels", value, 1, 16)
 
 
