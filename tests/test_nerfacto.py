@@ -13,6 +13,7 @@ torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra ner
 import nerfacto_files as files  # noqa: E402
 from cagefield.cameras.camera import Camera  # noqa: E402
 from cagefield.errors import FieldError  # noqa: E402
+from cagefield.fields.external.external_field import number, whole_number  # noqa: E402
 from cagefield.fields.external.external_file import load_external, save_external  # noqa: E402
 from cagefield.fields.external.nerfacto import NerfactoField  # noqa: E402
 from cagefield.fields.external.nerfacto_torch import next_bins  # noqa: E402
@@ -188,6 +189,14 @@ def test_hostile_configs_are_refused(tmp_path: Path, text: str, message: str) ->
     with pytest.raises(FieldError, match=message) as caught:
         read_external(checkpoint)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [10**400, -(10**400), float("inf"), float("nan"), 1e308])
+def test_numbers_beyond_all_floats_are_refused(value: float) -> None:
+    with pytest.raises(FieldError, match=r"near is .*; it must be from 0 to 100"):
+        number("near", value, 0.0, 100.0)
+    with pytest.raises(FieldError, match=r"levels is .*; it must be from 1 to 16"):
+        whole_number("levels", value, 1, 16)
 
 
 def test_a_missing_config_names_the_option(tmp_path: Path) -> None:

@@ -6,11 +6,12 @@ alone, and schedulers elsewhere belong behind TLS with certificates of their own
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
 import logging
 import warnings
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -134,10 +135,8 @@ def _local_workers(count: int, security: Security | None) -> Iterator[LocalClust
         "distributed.scheduler.http.routes": [],
         "distributed.worker.http.routes": [],
     }
-    with (
-        TemporaryFolder("cluster") as scratch,
-        dask.config.set(settings),
-        LocalCluster(
+    with TemporaryFolder("cluster") as scratch, dask.config.set(settings):
+        cluster = LocalCluster(
             n_workers=count,
             threads_per_worker=1,
             processes=True,
@@ -148,9 +147,13 @@ def _local_workers(count: int, security: Security | None) -> Iterator[LocalClust
             local_directory=str(scratch),
             security=security,
             silence_logs=logging.CRITICAL,
-        ) as cluster,
-    ):
-        yield cluster
+        )
+        try:
+            yield cluster
+        finally:
+            # On a busy machine dask waits too briefly for its killed workers to end.
+            with suppress(TimeoutError, asyncio.TimeoutError):
+                cluster.close()
 
 
 @contextmanager

@@ -129,8 +129,9 @@ def number(name: str, value: Any, low: float, high: float) -> float:
     """A finite number from low to high. Raises FieldError for anything else."""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise FieldError(f"{name} must be a number, got {type(value).__name__}")
-    if not low <= float(value) <= high:  # NaN too
-        raise FieldError(f"{name} is {float(value):g}; it must be from {low:g} to {high:g}")
+    if not low <= value <= high:  # NaN too; whole numbers beyond all floats are compared as they are
+        shown = f"{float(value):g}" if abs(value) < 1e300 or value != value else "beyond 1e300"
+        raise FieldError(f"{name} is {shown}; it must be from {low:g} to {high:g}")
     return float(value)
 
 
