@@ -29,7 +29,7 @@ MAX_LOCAL_WORKERS = 256
 CONNECT_SECONDS = 30.0
 """Time that a scheduler elsewhere and its first worker are waited for."""
 LOCAL_CONNECT_SECONDS = 600.0
-"""The same time for local workers, on a machine that may be busy."""
+"""Time for local workers, on a machine that may be busy."""
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from cagefield.server.render_worker.picks import (
     RegionPick,
 )
 from cagefield.server.render_worker.tasks import BoxTask, HistogramTask, PickTask
+from cagefield.server.web.point_handlers import load_free_form
 
 _LABELS = {"all": "Select all", "grow": "Grow selection", "shrink": "Shrink selection"}
 
@@ -34,6 +35,8 @@ async def change_selection(coordinator: Coordinator, page: Page, message: messag
     elif isinstance(message, messages.RemoveElements):
         _remove(coordinator, message)
     elif isinstance(message, messages.SelectionCage):
+        if message.cage != "box":
+            await load_free_form(page, message.cage)
         await _place_cage(coordinator, message)
     elif isinstance(message, messages.ChangeSelection):
         await _change(coordinator, message)
