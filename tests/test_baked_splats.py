@@ -17,6 +17,7 @@ from cagefield.images.metrics import psnr
 from cagefield.rendering.renderers import renderer_of
 from cagefield.rendering.splats.bake_splats import baked_splats
 from splat_scenes import random_splats
+from tiers import nightly_after_first
 
 INNER = Cage.box((0, 0, 0), (1.2, 1.0, 1.4))
 CONTINUOUS = (
@@ -29,7 +30,7 @@ TURNED = Edit.move(INNER).rotate((0.0, 0.0, math.pi / 2))
 COPIED = Edit.copy(INNER).translate((0, 1.5, 0))
 
 
-@pytest.mark.parametrize("preserve", [True, False])
+@pytest.mark.parametrize("preserve", nightly_after_first([True, False]))
 @pytest.mark.parametrize("stack", [[CONTINUOUS], [TURNED, COPIED], [CONTINUOUS, Edit.delete(INNER)]])
 def test_pictures_are_those_of_the_edits(stack: list[Edit], preserve: bool) -> None:
     field = random_splats(200, degree=3)

@@ -14,6 +14,7 @@ from cagefield.typing import Array
 from cagefield.warps import LatticeShell
 from cagefield.warps.lattice_flow import sampled, slope_bound
 from cagefield.warps.lattice_motion import MOST_TURN, Piece
+from tiers import nightly_except
 
 ARM = Cage.box((0, 0, 0), (0.3, 0.3, 1.0)).subdivided((1, 1, 4))
 AROUND = Cage.box((0, 0, 0), 2.4)
@@ -222,7 +223,7 @@ def test_density_follows_an_edit() -> None:
     np.testing.assert_allclose(where.points, edit.inner.evaluate(u)[0], atol=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", nightly_except(range(6), 1, 3, 4))
 def test_random_edits(seed: int) -> None:
     check_map(random_lattice_edit(seed), 100)
 

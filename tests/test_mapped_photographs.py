@@ -25,6 +25,7 @@ from cagefield.procedural.parts import Part, Primitive, pose_matrix
 from cagefield.procedural.shapes import Box, Cylinder, Sphere
 from cagefield.procedural.textures import Plain
 from cagefield.rendering.reference_renderer import intersect_box
+from tiers import nightly_after_first
 
 GREY = Plain((0.6, 0.5, 0.4))
 
@@ -102,7 +103,7 @@ def _stretched(scene: ProceduralScene) -> list[int]:
 # -- photographs -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", nightly_after_first(SCENES))
 def test_a_map_that_moves_nothing_gives_the_photograph(name: str) -> None:
     scene, camera = procedural_scene(name), eye(name, 64)
     photo = scene.photograph(camera, background="white")

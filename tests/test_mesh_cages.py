@@ -194,7 +194,7 @@ def check(edit: Continuous, seed: int, samples: int) -> None:
         assert max(steepest) < 2.0
 
 
-@pytest.mark.parametrize("seed", nightly_except(range(20), 0, 5, 7, 13))
+@pytest.mark.parametrize("seed", nightly_except(range(20), 5, 7))
 def test_random_edits_do_not_fold(seed: int) -> None:
     check(random_mesh_edit(seed), seed, 300)
 

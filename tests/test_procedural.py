@@ -30,6 +30,7 @@ from cagefield.procedural.shapes import (
 )
 from cagefield.procedural.textures import Plain
 from cagefield.rendering.reference_renderer import render_sampled
+from tiers import nightly_after_first
 
 ELL = ((-0.4, -0.3), (0.4, -0.3), (0.4, 0.0), (0.0, 0.0), (0.0, 0.35), (-0.4, 0.35))
 LATHE = ((0.0, -0.4), (0.3, -0.4), (0.15, 0.0), (0.35, 0.4), (0.0, 0.4))
@@ -369,7 +370,9 @@ def test_occlusion_anew_is_of_the_parts_where_they_stand():
     np.testing.assert_allclose(again.with_new_occlusion().occlusion(points, up), were, atol=1e-6)
 
 
-@pytest.mark.parametrize(("name", "part"), [("digger", "cone"), ("microphone", "base"), ("plant", "flower")])
+@pytest.mark.parametrize(
+    ("name", "part"), nightly_after_first([("digger", "cone"), ("microphone", "base"), ("plant", "flower")])
+)
 def test_occlusion_anew_changes_nothing_far_from_what_moved(name, part):
     scene = procedural_scene(name)
     camera = viewpoints(1, 64, lowest=scene.lowest)[0]
@@ -475,7 +478,8 @@ def test_make_scene_is_a_nerf_synthetic_data_set(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("depth", "splits"), [("all", ["test", "train", "val"]), ("test", ["test"]), ("none", [])]
+    ("depth", "splits"),
+    nightly_after_first([("all", ["test", "train", "val"]), ("test", ["test"]), ("none", [])]),
 )
 def test_make_scene_writes_the_depth_that_is_asked_for(tmp_path, depth, splits):
     out = make_scene("plant", tmp_path / "plant", views=1, size=12, test_views=1, depth=depth)

@@ -27,6 +27,7 @@ from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.tasks import Shown, values_of
 from scenes import ball_field
 from splat_scenes import splat_scene
+from tiers import nightly_except
 
 CAMERA = Camera.look_at((0, -3, 0.8), (0, 0, 0), width=96, height=96, fov_x=0.6)
 INNER = Cage.box((0.3, 0.0, 0.2), (0.5, 0.7, 0.5))
@@ -60,7 +61,7 @@ def cancelled_after(checks: int) -> Callable[[], None]:
     return proceed
 
 
-@pytest.mark.parametrize("name", EDITS)
+@pytest.mark.parametrize("name", nightly_except(EDITS, "splats-continuous", "voxels-move"))
 def test_each_refinement_is_nearer_to_the_final_picture(cache: RendererCache, name: str) -> None:
     shown = Shown(values_of((EDITS[name],)))
     attained, distances = [], []
@@ -92,7 +93,7 @@ def test_a_draft_computes_no_patch(cache: RendererCache, name: str, monkeypatch:
     assert np.isfinite(made.renderer.render(CAMERA, background="white").rgb).all()
 
 
-@pytest.mark.parametrize("name", EDITS)
+@pytest.mark.parametrize("name", nightly_except(EDITS, "splats-continuous", "voxels-move"))
 def test_patches_are_cancelled_from_within_and_made_whole_later(cache: RendererCache, name: str) -> None:
     patcher, edits = cache.scene.patcher, [EDITS[name]]
     calls = 0

@@ -19,6 +19,7 @@ torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra ner
 from cagefield.training.nerf.nerf_config import NerfConfig  # noqa: E402
 from cagefield.training.nerf.nerf_run import NerfRun, build_initial_network  # noqa: E402
 from cagefield.training.nerf.train_nerf import evaluate_nerf, train_nerf  # noqa: E402
+from tiers import nightly_after_first  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +153,7 @@ def test_an_untrained_network_is_thin_fog_so_that_it_can_learn(config, seed) -> 
     assert (sigma > 0.0).mean() > 0.6
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", nightly_after_first(range(3)))
 def test_both_networks_learn(photos, seed) -> None:
     run = NerfRun(load_dataset(photos), tiny(steps=60, seed=seed))
     while run.done < 1.0:
