@@ -61,7 +61,7 @@ def cancelled_after(checks: int) -> Callable[[], None]:
     return proceed
 
 
-@pytest.mark.parametrize("name", nightly_except(EDITS, "splats-continuous", "voxels-move"))
+@pytest.mark.parametrize("name", nightly_except(EDITS, "continuous", "move"))
 def test_each_refinement_is_nearer_to_the_final_picture(cache: RendererCache, name: str) -> None:
     shown = Shown(values_of((EDITS[name],)))
     attained, distances = [], []
@@ -93,7 +93,7 @@ def test_a_draft_computes_no_patch(cache: RendererCache, name: str, monkeypatch:
     assert np.isfinite(made.renderer.render(CAMERA, background="white").rgb).all()
 
 
-@pytest.mark.parametrize("name", nightly_except(EDITS, "splats-continuous", "voxels-move"))
+@pytest.mark.parametrize("name", nightly_except(EDITS, "continuous", "move"))
 def test_patches_are_cancelled_from_within_and_made_whole_later(cache: RendererCache, name: str) -> None:
     patcher, edits = cache.scene.patcher, [EDITS[name]]
     calls = 0
