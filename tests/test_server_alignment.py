@@ -105,7 +105,7 @@ def test_the_up_direction_is_undone_saved_and_restored(tmp_path: Path) -> None:
     recovered = SceneStore(Scene.open(tmp_path / "ball"), tmp_path / "ball").recovered()
     assert recovered is not None and recovered.up == session.document.up
     store.save(session)
-    # What was saved is what is known: the next save finds no change by another program.
+    # The saved values are the known ones: the next save finds no change by another program.
     assert Scene.open(tmp_path / "ball").alignment.direction == session.document.up
     session.set_scale(2.0)
     store.save(session)

@@ -63,7 +63,7 @@ class Case:
         """Measured edits: an exact map, where that is the truth, carries the light along as it was."""
         if self.moved is not None:
             return self.given
-        # What is made of an edit is kept for all that equal it: another blend takes another name.
+        # Results of an edit are kept for all equal edits: another blend takes another name.
         named = {} if self.blend == "harmonic" else {"name": self.name}
         return EditStack(edit.replace(relight="none", **named) for edit in self.given)
 
