@@ -127,7 +127,7 @@ def marched(
 
 @pytest.mark.parametrize(
     ("contracted", "room"),
-    nightly_except(product([False, True], [0, 100, 100_000]), (False, 100), (True, 100_000)),
+    nightly_except(product([False, True], [0, 100, 100_000]), (True, 100_000)),
 )
 def test_samples_by_cell_add_up_as_those_of_workers(tmp_path, contracted, room):
     """Without room for samples, with room for some, and for all."""

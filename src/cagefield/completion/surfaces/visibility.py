@@ -34,6 +34,9 @@ MAX_SURFELS = 300_000
 NORMAL_WINDOW_PIXELS = 3
 """Edge of the window over which the normal of a pixel is computed, pixels."""
 
+MARGIN_PIXELS = 4
+"""Pixels around those that show a surface that its edges and normals depend on."""
+
 MIN_SURFACE_OPACITY = 0.5
 """Minimum opacity of a pixel that shows a surface."""
 
@@ -126,9 +129,12 @@ def render_visibility(
         check_cancelled()
         image = render(camera)
         check_cancelled()
-        surface, solid = _image_surfels(image, camera)
+        is_surface = (image.opacity > MIN_SURFACE_OPACITY) & np.isfinite(image.depth)
+        depths.append(np.where(is_surface, image.depth, np.inf).astype(np.float64))
+        rows = _rows_around(is_surface)
+        surface, solid = _image_surfels(image, camera, rows)
         check_cancelled()
-        colors = np.clip(image.rgb.reshape(-1, 3), 0.02, 1.0)
+        colors = np.clip(image.rgb[rows].reshape(-1, 3), 0.02, 1.0)
         mean = colors.mean(axis=1)
         log_mean = np.log(mean)
         pairs.append(_sample_pairs(log_mean, surface, solid, rng))
@@ -136,8 +142,6 @@ def render_visibility(
         surfaces.append(surface.take(is_known))
         log_brightness.append(log_mean[is_known])
         hue.append((colors / mean[:, None])[is_known])
-        is_surface = (image.opacity > MIN_SURFACE_OPACITY) & np.isfinite(image.depth)
-        depths.append(np.where(is_surface, image.depth, np.inf).astype(np.float64))
     first, second = (
         concatenate_surfels([getattr(pair, name) for pair in pairs]) for name in ("first", "second")
     )
@@ -179,17 +183,28 @@ def orbit_cameras(bounds: Array) -> list[Camera]:
     return cameras
 
 
-def _image_surfels(image: RenderResult, camera: Camera) -> tuple[Surfels, Mask]:
-    """(surfel of each pixel [H*W], mask [H,W] of the pixels that show a surface)."""
-    depth = image.depth
-    solid = (image.opacity > 0.98) & np.isfinite(depth)
+def _rows_around(mask: Mask) -> tuple[slice, slice]:
+    """Rows and columns around the pixels of a mask [H,W], with room for the windows of `_image_surfels`."""
+    slices = []
+    for axis in (1, 0):
+        pixels = np.flatnonzero(mask.any(axis=axis))
+        first, last = (int(pixels[0]), int(pixels[-1])) if len(pixels) else (0, 0)
+        slices.append(slice(max(first - MARGIN_PIXELS, 0), last + 1 + MARGIN_PIXELS))
+    return slices[0], slices[1]
+
+
+def _image_surfels(image: RenderResult, camera: Camera, rows: tuple[slice, slice]) -> tuple[Surfels, Mask]:
+    """(surfel of each pixel [h*w], mask [h,w] of the pixels that show a surface) in a part of an image."""
+    depth = image.depth[rows]
+    solid = (image.opacity[rows] > 0.98) & np.isfinite(depth)
     padded_depth = np.where(solid, depth, 1e6)
     jump = ndimage.maximum_filter(padded_depth, 3) - ndimage.minimum_filter(padded_depth, 3)
     solid &= ~ndimage.binary_dilation(jump > MIN_EDGE_DEPTH_SHARE * np.where(solid, depth, 1.0), iterations=1)
     origins, directions = camera.rays()
-    points = origins + np.where(solid, depth, 0.0).reshape(-1, 1) * directions
+    directions = directions.reshape(*image.depth.shape, 3)[rows]
+    points = origins[0] + np.where(solid, depth, 0.0)[..., None] * directions
     check_cancelled()
-    return Surfels(points, _image_normals(points.reshape(*solid.shape, 3), origins[0], solid)), solid
+    return Surfels(points.reshape(-1, 3), _image_normals(points, origins[0], solid)), solid
 
 
 def _sample_pairs(
