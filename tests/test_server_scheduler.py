@@ -6,13 +6,16 @@ import pytest
 
 from cagefield.server.protocol.common import DrawnHere
 from cagefield.server.render_queue.damage import Differing, everywhere
-from cagefield.server.render_queue.requests import EditsRequest, Request
-from cagefield.server.render_queue.scheduler import (
+from cagefield.server.render_queue.moving_resolution import (
     MAX_MOVING_SECONDS,
-    MAX_TILES,
-    MOST_MOVING,
     MOVING_SECONDS,
     MOVING_WIDTH_PX,
+)
+from cagefield.server.render_queue.requests import EditsRequest, Request
+from cagefield.server.render_queue.scheduler import (
+    DRAG_SETTLE_SECONDS,
+    MAX_TILES,
+    MOST_MOVING,
     SETTLE_SECONDS,
     Scheduler,
 )
@@ -87,8 +90,12 @@ class Bench:
         self.scheduler.sent(request, max(self.least, request.refinement))
         return request
 
+    @property
+    def is_dragging(self) -> bool:
+        return self.scheduler._dragging
+
     def settle(self) -> None:
-        self.now += SETTLE_SECONDS + 1e-3
+        self.now += (DRAG_SETTLE_SECONDS if self.is_dragging else SETTLE_SECONDS) + 1e-3
 
     def finish(self) -> list[Request]:
         """Everything that is owed, shown as it comes."""
@@ -285,6 +292,70 @@ def test_a_lost_picture_is_rendered_again_and_an_impossible_one_is_not() -> None
     assert again is not None and again.moving
     b.scheduler.abandoned(again, again=False)
     assert b.scheduler.next(b.now) is None
+
+
+def test_a_drag_that_begins_on_a_whole_picture_draws_nothing() -> None:
+    b = Bench()
+    b.open(1)
+    b.step()
+    b.settle()
+    b.finish()
+    b.scheduler.edits(0, True, b.now)
+    assert b.step() is None
+    b.now += 10.0 * DRAG_SETTLE_SECONDS
+    assert b.step() is None
+    b.scheduler.edits(1, True, b.now)
+    picture = b.step()
+    assert picture is not None and picture.moving and picture.revision == 1
+
+
+def test_a_drag_abandons_a_refinement_and_does_not_draw_before_it_moves() -> None:
+    b = Bench(least=Refinement.DRAFT)
+    b.open(1)
+    b.step()
+    b.settle()
+    tile = b.scheduler.next(b.now)
+    assert isinstance(tile, Request) and not tile.moving
+    generation = b.scheduler.generation
+    b.scheduler.edits(0, True, b.now)
+    assert b.scheduler.generation > generation
+    b.scheduler.abandoned(tile, again=True)
+    b.scheduler.edits(1, True, b.now)
+    picture = b.step()
+    assert picture is not None and picture.moving and picture.revision == 1
+
+
+@pytest.mark.parametrize("rate", [3e6, 3e7])
+def test_the_first_picture_of_the_first_drag_is_as_small_as_is_legible(rate: float) -> None:
+    """Pictures without edits were measured, which cost less."""
+    b = Bench(rate)
+    b.open(1)
+    b.step()
+    b.settle()
+    b.finish()
+    widths = []
+    for revision in (1, 2, 3, 4):
+        b.scheduler.edits(revision, True, b.now)
+        picture = b.step()
+        assert picture is not None and picture.moving
+        widths.append(picture.region.full_width)
+    assert widths[0] == MOVING_WIDTH_PX == min(widths)
+    assert (max(widths) > MOVING_WIDTH_PX) == (rate > 1e7)
+
+
+def test_a_slow_hand_is_not_followed_by_whole_pictures() -> None:
+    b = Bench(2e7)
+    b.open(1)
+    b.step()
+    b.settle()
+    b.finish()
+    for revision in range(1, 8):
+        b.scheduler.edits(revision, True, b.now)
+        assert [picture.moving for picture in b.finish()] == [True]
+        b.now += 0.6 * DRAG_SETTLE_SECONDS
+        assert b.step() is None
+    b.now += DRAG_SETTLE_SECONDS
+    assert [picture.moving for picture in b.finish()] == [False]
 
 
 def test_while_a_drag_goes_on_pictures_are_quick_and_tiles_too() -> None:

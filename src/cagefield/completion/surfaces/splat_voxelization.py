@@ -44,8 +44,8 @@ def choose_voxel_size(splats: SplatField, box: Array) -> float:
     return float(np.clip(splats.take(inside).sample_spacing, smallest, largest))
 
 
-def voxelize_splats(splats: SplatField, box: Array, voxel: float) -> VoxelField:
-    """Voxel field of splats in a world-space box [2,3]: density, and view-independent color.
+def voxelize_splats(splats: SplatField, box: Array, voxel: float, *, has_colors: bool = True) -> VoxelField:
+    """Voxel field of splats in a world-space box [2,3]: density, and view-independent color, else gray.
 
     `voxel` is the edge of a voxel, world units; the box grows to a whole number of them.
     """
@@ -59,14 +59,15 @@ def voxelize_splats(splats: SplatField, box: Array, voxel: float) -> VoxelField:
     grid = SplatGrid(wide, bounds[0], voxel, (int(count[0]), int(count[1]), int(count[2])))
     density = np.where(covered, grid.density(), np.float32(0.0))
     is_stored = density * voxel > MIN_OPTICAL_DEPTH
-    sh = ((grid.colors(is_stored)[:, None] - 0.5) / C0).astype(np.float32)
+    colors = grid.colors(is_stored) if has_colors else np.full((np.count_nonzero(is_stored), 3), 0.5)
+    sh = ((colors[:, None] - 0.5) / C0).astype(np.float32)
     return VoxelField(bounds, grid.count, np.flatnonzero(is_stored), density[is_stored], sh)
 
 
 def voxelize_bounds(splats: SplatField) -> VoxelField:
-    """Voxel field of splats in their bounds, at the resolution of the fit of a light model."""
+    """Gray voxel field of splats in their bounds, at the resolution of the fit of a light model."""
     edge = float((splats.bounds[1] - splats.bounds[0]).max())
-    return voxelize_splats(splats, splats.bounds, edge / MAX_BOUNDS_VOXELS)
+    return voxelize_splats(splats, splats.bounds, edge / MAX_BOUNDS_VOXELS, has_colors=False)
 
 
 def _widen_splats(splats: SplatField, bounds: Array, voxel: float) -> SplatField:

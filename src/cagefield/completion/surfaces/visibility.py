@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from dataclasses import dataclass
 
 import numpy as np
@@ -124,34 +126,72 @@ def render_visibility(
     used = tuple(
         downscale_camera(camera) for camera in [cameras[n] for n in sorted(numbers)] or orbit_cameras(bounds)
     )
-    pairs, surfaces, log_brightness, hue, depths = [], [], [], [], []
-    for camera in used:
-        check_cancelled()
-        image = render(camera)
-        check_cancelled()
-        is_surface = (image.opacity > MIN_SURFACE_OPACITY) & np.isfinite(image.depth)
-        depths.append(np.where(is_surface, image.depth, np.inf).astype(np.float64))
-        rows = _rows_around(is_surface)
-        surface, solid = _image_surfels(image, camera, rows)
-        check_cancelled()
-        colors = np.clip(image.rgb[rows].reshape(-1, 3), 0.02, 1.0)
-        mean = colors.mean(axis=1)
-        log_mean = np.log(mean)
-        pairs.append(_sample_pairs(log_mean, surface, solid, rng))
-        is_known = solid.reshape(-1) & ((surface.normals**2).sum(axis=1) > 0.5)
-        surfaces.append(surface.take(is_known))
-        log_brightness.append(log_mean[is_known])
-        hue.append((colors / mean[:, None])[is_known])
+    views = _in_background(lambda camera, image: _view_surfaces(camera, image, rng), render, used)
+    all_pairs = [view.pairs for view in views]
     first, second = (
-        concatenate_surfels([getattr(pair, name) for pair in pairs]) for name in ("first", "second")
+        concatenate_surfels([getattr(pairs, name) for pairs in all_pairs]) for name in ("first", "second")
     )
-    all_pairs = SurfacePairs(first, second, np.concatenate([pair.log_change for pair in pairs]))
-    surface = concatenate_surfels(surfaces)
+    log_change = np.concatenate([pairs.log_change for pairs in all_pairs])
+    surface = concatenate_surfels([view.surface for view in views])
     surfel_rows = _sample_rows(len(surface.points), MAX_SURFELS, rng)
-    rows = _sample_rows(len(all_pairs.log_change), MAX_PAIRS, rng)
-    all_pairs = SurfacePairs(first.take(rows), second.take(rows), all_pairs.log_change[rows])
-    brightness, hues = (np.concatenate(each)[surfel_rows] for each in (log_brightness, hue))
-    return CameraVisibility(all_pairs, surface.take(surfel_rows), brightness, hues, used, tuple(depths))
+    rows = _sample_rows(len(log_change), MAX_PAIRS, rng)
+    return CameraVisibility(
+        SurfacePairs(first.take(rows), second.take(rows), log_change[rows]),
+        surface.take(surfel_rows),
+        np.concatenate([view.log_brightness for view in views])[surfel_rows],
+        np.concatenate([view.hue for view in views])[surfel_rows],
+        used,
+        tuple(view.depth for view in views),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _ViewSurfaces:
+    """Surfaces that one camera sees; attributes as in `CameraVisibility`."""
+
+    pairs: SurfacePairs
+    surface: Surfels
+    log_brightness: Array
+    hue: Array
+    depth: Array
+
+
+def _in_background(
+    process: Callable[[Camera, RenderResult], _ViewSurfaces],
+    render: Callable[[Camera], RenderResult],
+    cameras: Sequence[Camera],
+) -> list[_ViewSurfaces]:
+    """Surfaces of each camera's image, in order; an image is processed while the next one is rendered."""
+    pool = ThreadPoolExecutor(1)
+    try:
+        views = []
+        for camera in cameras:
+            check_cancelled()
+            image = render(camera)
+            views.append(pool.submit(copy_context().run, process, camera, image))
+        return [view.result() for view in views]
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _view_surfaces(camera: Camera, image: RenderResult, rng: np.random.Generator) -> _ViewSurfaces:
+    """Surfaces of one camera's image."""
+    check_cancelled()
+    is_surface = (image.opacity > MIN_SURFACE_OPACITY) & np.isfinite(image.depth)
+    rows = _rows_around(is_surface)
+    surface, solid = _image_surfels(image, camera, rows)
+    check_cancelled()
+    colors = np.clip(image.rgb[rows].reshape(-1, 3), 0.02, 1.0)
+    mean = colors.mean(axis=1)
+    log_mean = np.log(mean)
+    is_known = solid.reshape(-1) & ((surface.normals**2).sum(axis=1) > 0.5)
+    return _ViewSurfaces(
+        _sample_pairs(log_mean, surface, solid, rng),
+        surface.take(is_known),
+        log_mean[is_known],
+        (colors / mean[:, None])[is_known],
+        np.where(is_surface, image.depth, np.inf).astype(np.float64),
+    )
 
 
 def _sample_rows(count: int, max_count: int, rng: np.random.Generator) -> NDArray[np.int64]:

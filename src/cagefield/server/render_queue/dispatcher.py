@@ -40,7 +40,7 @@ RESTARTS = 3
 
 _GIVEN_UP = "the renderer ends again and again (out of memory?); save your edits and restart the editor"
 
-REST_SECONDS = 2.0
+REST_SECONDS = 0.3
 """Time without a task that a page or a caller waits for after which a background task may be a long one."""
 
 PATIENT = 4

@@ -25,6 +25,7 @@ from cagefield.server.render_queue.damage import (
     union,
 )
 from cagefield.server.render_queue.frame_cost import FrameCost
+from cagefield.server.render_queue.moving_resolution import MOVING_SECONDS, moving_scale
 from cagefield.server.render_queue.page_state import PageState
 from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_worker.refinement import FINAL, Refinement
@@ -34,26 +35,17 @@ MOST_UNSHOWN, MOST_MOVING = 2, 1
 """Pictures sent and not yet shown, at most, per page; and while something moves: another one would be older
 than it had to be, and would be rendered while the page has the one before to draw."""
 
-MOVING_SECONDS = 0.05
-"""Time that a picture may take while something moves."""
-
-MOVING_WIDTH_PX, MAX_MOVING_SECONDS = 400, 0.1
-"""Width that it has if that takes at most so long: smaller ones are too blurred to judge an edit by."""
-
 TILE_SECONDS = 0.25
 """Time that a tile may take at rest; each costs the page a frame. Abandoned ones end sooner."""
 
 SETTLE_SECONDS = 0.12
-"""How long nothing may have changed before the view counts as at rest."""
+"""Time without a change after which the view counts as at rest."""
+
+DRAG_SETTLE_SECONDS = 0.25
+"""The same during a drag: a slow hand moves on before a whole picture is there."""
 
 MAX_TILES = 9
 """Tiles of a view, at most."""
-
-MIN_SIDE_PX = 80
-"""Shorter side of the smallest moving picture, pixels."""
-
-RESOLUTION_SCALES = (1.0, 0.8, 0.65, 0.5, 0.4, 0.32, 0.25, 0.2, 0.16, 0.125)
-"""Resolutions of moving pictures as shares of the full one: a few, since each has its own ray directions."""
 
 
 class Scheduler:
@@ -71,6 +63,8 @@ class Scheduler:
         self._cost = FrameCost()
         self._overhead = 0.0
         self._dragging = False
+        self._is_drag_measured = False
+        """Whether a picture of a drag was measured: pictures without edits, before, cost less."""
         self._revision = 0
         self._known = Refinement.DRAFT
         """Last refinement of the revision that was rendered: it costs nothing to have it again."""
@@ -111,8 +105,9 @@ class Scheduler:
     def edits(self, revision: int, dragging: bool, now: float) -> None:
         """The edits' picture is another one, or a drag begins or ends.
 
-        Where a drag ends nothing has to settle: the fine picture comes as soon as a quick one shows the
-        drag, or at once where that is shown already, or on a fine picture.
+        Where a drag begins nothing has to be drawn. Where it ends nothing has to settle: the fine picture
+        comes as soon as a quick one shows the drag, or at once where that is shown already, or on a fine
+        picture.
         """
         if revision == self._revision and dragging == self._dragging:
             return
@@ -122,11 +117,13 @@ class Scheduler:
         self._revision, self._dragging = revision, dragging
         for page, p in self._pages.items():
             was_shown = same and p.shown_version == p.version
+            if was_shown and not let_go and p.tiles == [] and self._running is None:
+                continue  # a drag begins on a whole picture
             self._changed(page, now)
             if let_go:
                 p.changed = -math.inf
-                if was_shown or p.showing.exact:
-                    p.shown_version = p.version
+            if was_shown or (let_go and p.showing.exact):
+                p.shown_version = p.version
 
     def drawing(self, page: int, here: DrawnHere, now: float) -> None:
         """A page draws pictures itself, or no more; of one that begins nothing is known that it has."""
@@ -158,7 +155,7 @@ class Scheduler:
         whole = (region.width, region.height) == (region.full_width, region.full_height)
         if request.moving:
             self._cost.add(rays, seconds - overhead)
-        if request.moving:
+            self._is_drag_measured |= self._dragging
             self._overhead += 0.5 * (min(overhead, MOVING_SECONDS) - self._overhead)
         page = self._pages.get(request.page)
         if page is not None:
@@ -233,7 +230,7 @@ class Scheduler:
         if self._running is not None:
             return None
         waits = [
-            p.changed + SETTLE_SECONDS - now
+            p.changed + self._settle_seconds - now
             for p in self._pages.values()
             if p.camera >= 0 and self._owes_tiles(p) and not p.moving and self._has_room(p)
         ]
@@ -264,6 +261,10 @@ class Scheduler:
         )
 
     # ---- inside ----
+
+    @property
+    def _settle_seconds(self) -> float:
+        return DRAG_SETTLE_SECONDS if self._dragging else SETTLE_SECONDS
 
     def _changed(self, page: int, now: float) -> None:
         p = self._pages[page]
@@ -324,7 +325,7 @@ class Scheduler:
                 return self._picture(page, scale, rect)
             self._cut(page, self._known)
         if p.tiles is None:
-            if p.moving or now - p.changed < SETTLE_SECONDS:
+            if p.moving or now - p.changed < self._settle_seconds:
                 return None
             self._cut(page, self._known)
         elif not p.tiles and p.attained < FINAL and not self._dragging:
@@ -360,18 +361,9 @@ class Scheduler:
         )
 
     def _scale(self, p: PageState, rect: Rect | None) -> float:
-        _, _, width, height = pixels(rect, p.width, p.height)
-        wanted, longest = (
-            math.sqrt(self._cost.rays(seconds - self._overhead, 0.4 * MOVING_SECONDS) / (width * height))
-            for seconds in (MOVING_SECONDS, MAX_MOVING_SECONDS)
-        )
-        legible = MOVING_WIDTH_PX / p.width
-        if wanted < legible:
-            wanted = min(legible, longest)
-        least = min(1.0, MIN_SIDE_PX / min(p.width, p.height))
-        if legible <= wanted < RESOLUTION_SCALES[0]:
-            least = max(least, legible)
-        return max(next((s for s in RESOLUTION_SCALES if s <= wanted), RESOLUTION_SCALES[-1]), least)
+        part = pixels(rect, p.width, p.height)[2:]
+        is_first_drag = self._dragging and not self._is_drag_measured
+        return moving_scale(self._cost, self._overhead, part, (p.width, p.height), is_first_drag)
 
     def _cut(self, page: int, refinement: Refinement) -> None:
         """Divide the damaged part of the view into tiles of about TILE_SECONDS."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 import ctypes
 import dataclasses
 import multiprocessing
+import os
 import signal
 import threading
 from collections.abc import Callable
@@ -165,6 +166,8 @@ class Worker:
         Where it is gone before it has begun, `on_lost` is called.
         """
         here, there = self._context.Pipe()
+        # Threads of OpenBLAS wait in loops after each product, and take the cores from the kernels' threads.
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         process = self._context.Process(
             target=serve,
             args=(there, self._generation, self.scene, self._device, self.files, self.background),
