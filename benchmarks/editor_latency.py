@@ -69,6 +69,8 @@ class EditorLatency:
     kinds: tuple[Kind, ...] = ("continuous", "discrete")
     empty_cache: bool = False
     """Start each repetition without compiled kernels."""
+    pause: float = 0.0
+    """Seconds between the cage and the first drag, in which a user looks at it."""
     gpu: bool = False
     """The page draws with the GPU by Vulkan, in place of software."""
     source: Path | None = None
@@ -104,8 +106,10 @@ class EditorLatency:
                     print(lines[-1], flush=True)
         drawn = "by the GPU" if self.gpu else "in software"
         machine = f"{cpu_model()}, {devices.threads()} cores; page drawn {drawn}, 1058x782"
-        command = "python -m benchmarks.editor_latency SCENE..." + (
-            " --empty-cache" if self.empty_cache else ""
+        command = (
+            "python -m benchmarks.editor_latency SCENE..."
+            + (" --empty-cache" if self.empty_cache else "")
+            + (f" --pause {self.pause:g}" if self.pause else "")
         )
         notes = f"Medians of {self.repeats} fresh editors; longest in brackets. {machine}. `{command}`"
         text = "\n".join(["# Latency of the first drags", "", *lines, "", notes, ""])
@@ -143,11 +147,9 @@ class EditorLatency:
                     raise CagefieldError(f"cagefield view {scene} did not start")
                 page = browser.new_page(viewport={"width": WINDOW[0], "height": WINDOW[1]})
                 page.goto(link.group(0), wait_until="commit")
-                return [
-                    self.measure(page, f"{scene.name}_{kind}_{number}", number)
-                    for number in range(DRAGS)
-                    if number or open_cage(page, cage_file(copy, kind)) is None
-                ]
+                open_cage(page, cage_file(copy, kind))
+                time.sleep(self.pause)
+                return [self.measure(page, f"{scene.name}_{kind}_{n}", n) for n in range(DRAGS)]
             finally:
                 browser.close()
                 server.terminate()

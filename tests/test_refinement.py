@@ -132,11 +132,31 @@ def test_visibility_keeps_its_images_where_it_is_cancelled(
     patcher = scene.patcher
     patcher._render = counted  # type: ignore[method-assign]
     with pytest.raises(GivenUpError):
-        patcher.warm(cancelled_after(10))
+        patcher.warm(proceed=cancelled_after(10))
     assert 0 < len(rendered) < 28
     patcher.warm()
     # The picture that was cancelled in its middle is rendered again.
     assert 28 <= len(rendered) <= 29 and not patcher._images
+
+
+def test_light_around_a_cage_is_known_before_it_is_dragged(
+    cache: RendererCache, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The block around the outer cage is made at rest; a drag elsewhere takes it, and shows the same."""
+    patcher, at_rest = cache.scene.patcher, BENT.replace(operations=())
+    whole = cache.renderer(Shown(values_of((BENT,))), Refinement.LIT).renderer.render(CAMERA)
+    patcher._cache.clear()
+    patcher._light_block = None
+    with pytest.raises(GivenUpError):
+        patcher.warm([at_rest], proceed=cancelled_after(0))
+    assert patcher._light_block is None
+    cache.warm_light(Shown(values_of((at_rest,))), lambda: None)
+    assert patcher._light_block is not None
+    for name in ("extract_voxel_block", "extract_splat_block"):
+        monkeypatch.setattr(patcher_module, name, lambda *args: pytest.fail("the block is known"))
+    stack = patcher.prepare([BENT])
+    assert stack[0].light is not None
+    np.testing.assert_array_equal(cache.plain.with_edits(stack).render(CAMERA).rgb, whole.rgb)
 
 
 @pytest.mark.parametrize(

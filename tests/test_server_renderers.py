@@ -240,7 +240,7 @@ def test_specks_do_not_count_when_a_cage_is_fitted() -> None:
 
 def session_of(drawn: Callable[[], tuple[Edit, ...]], moving: bool = False) -> Any:
     """A session as background work asks it, without connected control points."""
-    shown = SimpleNamespace(removed=None)
+    shown = SimpleNamespace(removed=None, preserve_opacity=True)
     return SimpleNamespace(moving=moving, drawn=drawn, shown=shown, detours_wanted=lambda: None)
 
 
@@ -276,6 +276,7 @@ def test_measuring_a_lattice_is_given_up_and_done_again_later(renderers: Rendere
     measured = []
     background = BackgroundWork(session, Any, lambda: measured.append(1), lambda _: None)  # type: ignore[arg-type]
     background.warming, background.light_known = [], True
+    background._lit.put(MOVED, True)
     background_task = background.next(0)
     assert background_task is not None
     background_task.done(stopped)
@@ -287,15 +288,21 @@ def test_measuring_a_lattice_is_given_up_and_done_again_later(renderers: Rendere
 
 def test_light_is_found_once_a_cage_needs_it_and_again_where_it_was_cancelled() -> None:
     edits: tuple[Edit, ...] = (MOVED.replace(relight="none"),)
-    session = session_of(lambda: edits, moving=True)
+    session = session_of(lambda: edits)
     background = BackgroundWork(session, Any, lambda: None, lambda _: None)  # type: ignore[arg-type]
     background.warming = []
+    background._errors.put(edits[0], None)
     assert background.next(0) is None
     edits = (MOVED,)
+    background._errors.put(MOVED, None)
     for result in (Stopped(1), Answered(1)):
         light = background.next(3)
         assert light is not None and light.make(1) == LightTask(1, 3)
         light.done(result)
+    for result in (Stopped(1), Answered(1)):
+        around = background.next(3)
+        assert around is not None and around.make(1) == LightTask(1, 3, Shown(values_of((MOVED,))))
+        around.done(result)
     assert background.next(3) is None
 
 

@@ -162,10 +162,26 @@ class Patcher:
                 attained = min(attained, PatchStage.INPAINTED)
         return attained
 
-    def warm(self, proceed: Callable[[], None] | None = None) -> None:
-        """Compute the visibility and the light model, which depend on the field alone; `proceed` cancels."""
+    def warm(
+        self,
+        edits: Sequence[Edit] = (),
+        *,
+        preserve_opacity: bool = True,
+        proceed: Callable[[], None] | None = None,
+    ) -> None:
+        """Compute all that does not depend on where the next drag goes; `proceed` cancels.
+
+        These are the visibility and the light model of the field and, where the last of the edits is a
+        continuous one that relights, the block around its outer cage.
+        """
         with cancellable(proceed):
             _ = self.light_model
+            last = edits[-1] if edits else None
+            if isinstance(last, Continuous) and last.relight != "none":
+                below = self.prepare(edits[:-1], preserve_opacity=preserve_opacity, proceed=proceed)
+                model = self._model_for(last)
+                if model is not None and model.has_effect:
+                    self._block_around(below, last, model)
 
     def _composite(
         self, below: PreparedStack, edit: Paste, pasted: Pasted, stage: PatchStage, preserve_opacity: bool
@@ -319,26 +335,30 @@ class Patcher:
             return cast("PreparedEdit | None", self._cache[key])
 
         def make() -> Patch | SplatPatch | None:
-            # The block below a cage stays the same over many drags of the cage.
-            block_key: Key = (*below.steps, edit.outer, model)
-            known = self._light_block[1] if self._light_block and self._light_block[0] == block_key else None
+            block = self._block_around(below, edit, model)
             light: PreparedEdit | None
             if isinstance(self._content, VoxelField):
-                block = known if isinstance(known, VoxelBlock) else None
-                block = block or extract_voxel_block(self._content, below, edit, model)
+                assert isinstance(block, VoxelBlock)
                 light = relight_voxels(self._content, below, edit, model, block, self._visibility)
-                self._light_block = block_key, block
             else:
-                around = known if isinstance(known, SplatBlock) else None
-                around = around or extract_splat_block(self._content, below, edit, model)
-                light = relight_splats(self._content, below, edit, model, self._visibility, around)
-                self._light_block = block_key, around
+                assert isinstance(block, SplatBlock)
+                light = relight_splats(self._content, below, edit, model, self._visibility, block)
             return None if light is None else light.patch
 
         patch = self._disk_cache.get_or_make(("light", model, *below.steps, edit.ungraded), make)
         relighting = None if patch is None else light_edit(edit, patch)
         self._store(key, relighting)
         return relighting
+
+    def _block_around(
+        self, below: PreparedStack, edit: Continuous, model: LightModel
+    ) -> VoxelBlock | SplatBlock:
+        """Block around the outer cage of an edit, above those below: the same over many drags of the cage."""
+        key: Key = (*below.steps, edit.outer, model)
+        if self._light_block is None or self._light_block[0] != key:
+            extract = extract_voxel_block if isinstance(self._content, VoxelField) else extract_splat_block
+            self._light_block = key, extract(self._content, below, edit, model)  # type: ignore[operator]
+        return self._light_block[1]
 
     def _store(self, key: Key, value: Patch | SplatPatch | PreparedEdit | None) -> None:
         """Store a patch, and drop the oldest beyond MAX_CACHED_PATCHES."""

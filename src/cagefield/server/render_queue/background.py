@@ -58,6 +58,8 @@ class BackgroundWork:
         self._warmed = 0
         self.warming = list(WarmStage)
         self.light_known = False
+        self._lit: IdentityCache[Edit, bool] = IdentityCache(64)
+        """Edits around which light is known."""
         self._errors: IdentityCache[Edit, Errors | None] = IdentityCache(64)
         self._jobs: list[Job] = []
         self._ending: list[tuple[Job, str]] = []
@@ -77,6 +79,9 @@ class BackgroundWork:
         needs_light = any(edit.relight != "none" for edit in self._session.drawn())
         if not self.light_known and (needs_light or expects_edits):
             return BackgroundTask(lambda number: LightTask(number, generation), self._light_done)
+        unlit = self._unlit()
+        if unlit:
+            return self._light_around(unlit, generation)
         measured = self._unmeasured()
         if measured is not None:
             return self._measure(*measured, generation)
@@ -102,6 +107,27 @@ class BackgroundWork:
     def _light_done(self, result: Result) -> None:
         """A field whose light cannot be found says so where an edit needs it."""
         self.light_known = self.light_known or not isinstance(result, Stopped)
+
+    def _unlit(self) -> tuple[Edit, ...]:
+        """Edits up to the last continuous one that relights, where light around it is not known; else none."""
+        if self._session.moving:
+            return ()
+        drawn = self._session.drawn()
+        for count in range(len(drawn), 0, -1):
+            edit = drawn[count - 1]
+            if isinstance(edit, Continuous) and edit.enabled and edit.relight != "none":
+                return () if edit in self._lit else drawn[:count]
+        return ()
+
+    def _light_around(self, edits: tuple[Edit, ...], generation: int) -> BackgroundTask:
+        document = self._session.shown
+        shown = Shown(values_of(edits), document.preserve_opacity, removed=document.removed)
+
+        def done(result: Result) -> None:
+            if not isinstance(result, Stopped):
+                self._lit.put(edits[-1], True)
+
+        return BackgroundTask(lambda number: LightTask(number, generation, shown), done)
 
     # ---- connected control points ----
 

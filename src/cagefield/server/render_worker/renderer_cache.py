@@ -132,6 +132,11 @@ class RendererCache:
         if stage is WarmStage.PICTURE:
             renderer.render(camera)
 
+    def warm_light(self, shown: Shown, proceed: Callable[[], None]) -> None:
+        """Light of the shown field, and around the last edit (`Patcher.warm`); `proceed` cancels."""
+        edits = self.edits(shown.edits)
+        self.shown_scene(shown).patcher.warm(edits, preserve_opacity=shown.preserve_opacity, proceed=proceed)
+
     def renderer(
         self, shown: Shown, refinement: Refinement, proceed: Callable[[], None] | None = None
     ) -> RefinedRenderer:

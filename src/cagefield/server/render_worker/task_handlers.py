@@ -137,7 +137,7 @@ class TaskHandlers:
 
     def _light(self, task: LightTask, stop: Callable[[], bool]) -> Result:
         try:
-            self._renderers.scene.patcher.warm(cancellation_check(stop))
+            self._renderers.warm_light(task.shown, cancellation_check(stop))
         except GivenUpError:
             return Stopped(task.number)
         return Answered(task.number)

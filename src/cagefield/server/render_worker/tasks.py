@@ -156,10 +156,14 @@ class WarmTask:
 
 @dataclass(frozen=True)
 class LightTask:
-    """The light of the field is to be known before an edit needs it; abandoned with its generation."""
+    """Light to be known before an edit needs it: of the field, and around the last of the edits shown.
+
+    Abandoned with its generation.
+    """
 
     number: int
     generation: int
+    shown: Shown = Shown(())
 
 
 @dataclass(frozen=True)
