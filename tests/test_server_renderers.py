@@ -240,8 +240,19 @@ def test_specks_do_not_count_when_a_cage_is_fitted() -> None:
 
 def session_of(drawn: Callable[[], tuple[Edit, ...]], moving: bool = False) -> Any:
     """A session as background work asks it, without connected control points."""
-    shown = SimpleNamespace(removed=None, preserve_opacity=True)
-    return SimpleNamespace(moving=moving, drawn=drawn, shown=shown, detours_wanted=lambda: None)
+
+    class Shown(SimpleNamespace):
+        @property
+        def applied(self) -> list[Any]:
+            return [SimpleNamespace(edit=edit) for edit in drawn()]
+
+    return SimpleNamespace(
+        moving=moving,
+        drawn=drawn,
+        drawn_below=lambda number: drawn()[:number],
+        shown=Shown(removed=None, preserve_opacity=True),
+        detours_wanted=lambda: None,
+    )
 
 
 def test_the_grid_bends_with_the_edit() -> None:
@@ -304,6 +315,11 @@ def test_light_is_found_once_a_cage_needs_it_and_again_where_it_was_cancelled() 
         assert around is not None and around.make(1) == LightTask(1, 3, Shown(values_of((MOVED,))))
         around.done(result)
     assert background.next(3) is None
+    # Another cage above it.
+    edits = (MOVED, MOVED.replace(name="second"))
+    background._errors.put(edits[1], None)
+    around = background.next(4)
+    assert around is not None and around.make(1) == LightTask(1, 4, Shown(values_of(edits)))
 
 
 def test_light_is_found_before_the_first_cage_while_there_is_time() -> None:

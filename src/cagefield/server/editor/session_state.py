@@ -120,6 +120,10 @@ class SessionState:
             return self.preview.edits
         return self._drawn(self.shown.applied)
 
+    def drawn_below(self, number: int) -> tuple[Edit, ...]:
+        """Those of `drawn` that are applied before the applied entry `number`, without the preview."""
+        return self._drawn(self.shown.applied[:number])
+
     def _drawn(self, entries: Iterable[Entry]) -> tuple[Edit, ...]:
         edits = (entry.edit for entry in entries)
         return tuple(

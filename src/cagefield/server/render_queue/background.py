@@ -109,14 +109,17 @@ class BackgroundWork:
         self.light_known = self.light_known or not isinstance(result, Stopped)
 
     def _unlit(self) -> tuple[Edit, ...]:
-        """Edits up to the last continuous one that relights, where light around it is not known; else none."""
+        """The last cage with light that follows it, after the edits below; none where light there is known.
+
+        Also a cage that moves nothing yet: its first drag takes the light around it.
+        """
         if self._session.moving:
             return ()
-        drawn = self._session.drawn()
-        for count in range(len(drawn), 0, -1):
-            edit = drawn[count - 1]
+        entries = list(self._session.shown.applied)
+        for number in reversed(range(len(entries))):
+            edit = entries[number].edit.without_parent
             if isinstance(edit, Continuous) and edit.enabled and edit.relight != "none":
-                return () if edit in self._lit else drawn[:count]
+                return () if edit in self._lit else (*self._session.drawn_below(number), edit)
         return ()
 
     def _light_around(self, edits: tuple[Edit, ...], generation: int) -> BackgroundTask:
