@@ -7,16 +7,15 @@ finer than the splats needs no index, and about a tenth of the time.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cagefield.compute import devices
 from cagefield.compute.cancellation import check_cancelled
+from cagefield.compute.parallel_parts import map_parts
 from cagefield.fields.sh import C0
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.splat_mixture import PackedSplats
@@ -77,14 +76,7 @@ class SplatGrid:
         return PackedSplats.from_arrays(splats.means, splats.log_scales, splats.quaternions, splats.opacities)
 
     def _in_slabs(self, add: Callable[[int, int], None]) -> None:
-        """Calls `add` with the first and end vertex of slabs along x, on all processors."""
+        """Calls `add` with the first and end vertex of slabs along x, by all threads."""
         check_cancelled()
-        threads = os.cpu_count() or 1
-        slabs = min(self.count[0], SLABS_PER_THREAD * threads)
-        ends: NDArray[np.int64] = np.linspace(0, self.count[0], slabs + 1).astype(np.int64)
-        pool = ThreadPoolExecutor(threads)
-        try:
-            for _ in pool.map(add, ends[:-1].tolist(), ends[1:].tolist()):
-                check_cancelled()
-        finally:
-            pool.shutdown(cancel_futures=True)
+        slab = -(-self.count[0] // (SLABS_PER_THREAD * devices.threads()))
+        map_parts(lambda part: add(part.start, part.stop), self.count[0], slab)

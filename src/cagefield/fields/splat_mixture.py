@@ -34,15 +34,14 @@ images.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.compute.parallel_parts import map_parts
 from cagefield.errors import FieldError
 from cagefield.fields import sh as spherical_harmonics
 from cagefield.geometry.quaternions import rotation_matrices
@@ -207,10 +206,5 @@ def _as_points(values: NDArray[Any], name: str) -> Float32:
 
 def _run_in_blocks(count: int, evaluate_rows: Callable[[slice], None]) -> None:
     """Evaluate `count` rows in blocks, on all processors; kernels release the GIL."""
-    blocks = [slice(start, start + BLOCK_POINTS) for start in range(0, count, BLOCK_POINTS)]
-    if len(blocks) < 2:
-        for block in blocks:
-            evaluate_rows(block)
-        return
-    with ThreadPoolExecutor(min(len(blocks), os.cpu_count() or 1)) as pool:
-        list(pool.map(evaluate_rows, blocks))
+    if count:
+        map_parts(evaluate_rows, count, BLOCK_POINTS)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.compute.parallel_parts import map_parts
 from cagefield.edits import Copy, Delete, Discrete, Edit, Paste
 from cagefield.edits.patch import SplatPatch
 from cagefield.fields.splat_field import SplatField
@@ -24,6 +25,7 @@ from cagefield.rendering.splats.gaussian_profile import (
 )
 from cagefield.typing import Array, Mask
 from cagefield.warps.forward import to_deformed
+from cagefield.warps.interfaces import Warp
 
 BEND = 0.08
 """Largest b of a splat that stays whole: a turn by 9 degrees from its middle to two standard deviations."""
@@ -36,6 +38,9 @@ FAINT = 0.3
 
 MIN_DRAWN_OPACITY = 1.0 / 255.0
 """Splats of at most this opacity are not drawn, and no children."""
+
+PART_SPLATS = 4096
+"""Splats whose bend one thread computes at a time."""
 
 SPACING = 1.6
 """Distance of children, in their standard deviations."""
@@ -81,7 +86,14 @@ def bent_children(
     proceed: Callable[[], None] | None,
 ) -> Children:
     """Rows of children for the splats over which the map of an edit bends."""
-    warp, count = edit.exact_warp, len(rows)
+    warp = edit.exact_warp
+    parts = map_parts(lambda part: _bend(warp, points[part], A[part], proceed), len(rows), PART_SPLATS)
+    return _rows(field, rows, np.concatenate(parts), BEND)
+
+
+def _bend(warp: Warp, points: Array, A: Array, proceed: Callable[[], None] | None) -> Array:
+    """Bend [M,3] of a map along the axes A [M,3,3] of splats at points [M,3]."""
+    count = len(points)
     steps = 2.0 * A.transpose(0, 2, 1)  # [M, axis, 3]
     every = np.concatenate([points[:, None], points[:, None] + steps, points[:, None] - steps], axis=1)
     mapped = to_deformed(warp, every.reshape(-1, 3), proceed=proceed)
@@ -95,7 +107,7 @@ def bent_children(
     shear[:, [0, 1, 2], [0, 1, 2]] = 0.0
     bend = np.maximum(bend, shear.max(axis=2))
     bend[lost[:, :1] | lost[:, 1:4] | lost[:, 4:7]] = 0.0
-    return _rows(field, rows, bend, BEND)
+    return np.asarray(bend)
 
 
 def _rows(field: SplatField, rows: NDArray[np.int64], change: Array, most: float) -> Children:

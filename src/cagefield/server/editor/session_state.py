@@ -121,7 +121,7 @@ class SessionState:
         return self._drawn(self.shown.applied)
 
     def drawn_below(self, number: int) -> tuple[Edit, ...]:
-        """Those of `drawn` that are applied before the applied entry `number`, without the preview."""
+        """Edits as in `drawn` that are applied before the applied entry `number`, without the preview."""
         return self._drawn(self.shown.applied[:number])
 
     def _drawn(self, entries: Iterable[Entry]) -> tuple[Edit, ...]:

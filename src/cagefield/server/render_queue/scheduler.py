@@ -42,7 +42,7 @@ SETTLE_SECONDS = 0.12
 """Time without a change after which the view counts as at rest."""
 
 DRAG_SETTLE_SECONDS = 0.25
-"""The same during a drag: a slow hand moves on before a whole picture is there."""
+"""`SETTLE_SECONDS` during a drag: a slow hand moves on before a whole picture is there."""
 
 MAX_TILES = 9
 """Tiles of a view, at most."""

@@ -1,0 +1,34 @@
+"""Array functions on parts of their rows, by all threads: loops of NumPy hold no lock of the interpreter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
+from typing import TypeVar
+
+from cagefield.compute import devices
+from cagefield.compute.cancellation import check_cancelled
+
+Result = TypeVar("Result")
+
+
+def map_parts(function: Callable[[slice], Result], rows: int, part: int) -> list[Result]:
+    """Results of `function(rows)` for parts of at most `part` rows each, in their order; one for no rows.
+
+    Each call is in the caller's scope of cancellation. The first error ends the rest, and is raised.
+    """
+    parts = [slice(begin, min(begin + part, rows)) for begin in range(0, max(rows, 1), part)]
+    threads = min(devices.threads(), len(parts))
+    if threads < 2:
+        return [function(each) for each in parts]
+    pool = ThreadPoolExecutor(threads)
+    try:
+        waiting = [pool.submit(copy_context().run, function, each) for each in parts]
+        results = []
+        for each in waiting:
+            results.append(each.result())
+            check_cancelled()
+        return results
+    finally:
+        pool.shutdown(cancel_futures=True)

@@ -1,0 +1,61 @@
+"""Array functions on parts of their rows: order, cancellation, errors."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+
+from cagefield.compute import devices
+from cagefield.compute.cancellation import cancellable, check_cancelled
+from cagefield.compute.parallel_parts import map_parts
+
+
+class CancelledError(Exception):
+    """Raised by a check."""
+
+
+@pytest.fixture(params=[1, 3])
+def threads(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
+    monkeypatch.setattr(devices, "threads", lambda: request.param)
+    return int(request.param)
+
+
+@pytest.mark.parametrize(("rows", "part"), [(0, 4), (1, 4), (10, 4), (12, 4), (10_000, 7)])
+def test_parts_cover_all_rows_in_order(threads: int, rows: int, part: int) -> None:
+    parts = map_parts(lambda part: np.arange(rows)[part], rows, part)
+    assert all(0 < len(each) <= part for each in parts) or rows == 0
+    np.testing.assert_array_equal(np.concatenate(parts), np.arange(rows))
+
+
+def test_parts_are_in_the_callers_scope_of_cancellation(threads: int) -> None:
+    seen: set[int] = set()
+
+    def proceed() -> None:
+        seen.add(threading.get_ident())
+        if len(done) > 3:
+            raise CancelledError
+
+    done: list[int] = []
+
+    def work(part: slice) -> None:
+        check_cancelled()
+        done.append(part.start)
+
+    with cancellable(proceed), pytest.raises(CancelledError):
+        map_parts(work, 1000, 1)
+    assert 3 < len(done) < 1000 and seen
+
+
+def test_the_first_error_ends_the_rest(threads: int) -> None:
+    done: list[int] = []
+
+    def work(part: slice) -> None:
+        if part.start == 5:
+            raise ValueError("part 5")
+        done.append(part.start)
+
+    with pytest.raises(ValueError, match="part 5"):
+        map_parts(work, 100_000, 1)
+    assert len(done) < 100_000 - 1
