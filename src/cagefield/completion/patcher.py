@@ -356,8 +356,12 @@ class Patcher:
         """Block around the outer cage of an edit, above those below: the same over many drags of the cage."""
         key: Key = (*below.steps, edit.outer, model)
         if self._light_block is None or self._light_block[0] != key:
-            extract = extract_voxel_block if isinstance(self._content, VoxelField) else extract_splat_block
-            self._light_block = key, extract(self._content, below, edit, model)  # type: ignore[operator]
+            block: VoxelBlock | SplatBlock
+            if isinstance(self._content, VoxelField):
+                block = extract_voxel_block(self._content, below, edit, model)
+            else:
+                block = extract_splat_block(self._content, below, edit, model)
+            self._light_block = key, block
         return self._light_block[1]
 
     def _store(self, key: Key, value: Patch | SplatPatch | PreparedEdit | None) -> None:
