@@ -20,6 +20,7 @@ from scipy.spatial import cKDTree
 
 from cagefield.completion.surfaces.grid_block import GridBlock, world_positions
 from cagefield.compute.cancellation import check_cancelled
+from cagefield.compute.parallel_parts import map_parts
 from cagefield.geometry import hexahedron
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Mask
@@ -137,12 +138,13 @@ class Surfels:
         """
         distances = np.empty((len(points), count))
         rows = np.empty((len(points), count), np.int64)
-        for begin in range(0, len(points), QUERY_POINTS):
+        tree, neighbors = self._tree, [*range(1, count + 1)]
+
+        def query(part: slice) -> None:
             check_cancelled()
-            part = slice(begin, begin + QUERY_POINTS)
-            distances[part], rows[part] = self._tree.query(
-                points[part], k=[*range(1, count + 1)], distance_upper_bound=radius, workers=-1
-            )
+            distances[part], rows[part] = tree.query(points[part], k=neighbors, distance_upper_bound=radius)
+
+        map_parts(query, len(points), QUERY_POINTS)
         return distances, rows
 
     def take(self, rows: Mask | NDArray[np.int64]) -> Surfels:
