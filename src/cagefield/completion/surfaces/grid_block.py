@@ -192,14 +192,22 @@ class GridBlock:
         rows = self.slot[mask]
         sh[rows] = 0.0
         sh[rows, 0] = (rgb - 0.5) / C0
-        return replace(self, sh=sh)
+        return self.with_coefficients(sh)
 
     def scale_colors(self, mask: Mask, ratio: Array) -> GridBlock:
         """Block with colors multiplied by `ratio` [N] at the vertices of a mask [X,Y,Z] with slots."""
         sh = self.sh.copy()
         rows = self.slot[mask]
         sh[rows] = scale_sh_colors(sh[rows], np.repeat(ratio[:, None], 3, axis=1))
-        return replace(self, sh=sh)
+        return self.with_coefficients(sh)
+
+    def with_coefficients(self, sh: Float32) -> GridBlock:
+        """Block with other coefficients [M,K,3], and all that was computed from its density."""
+        block = replace(self, sh=sh)
+        block.__dict__.update(
+            {name: self.__dict__[name] for name in _CACHED_PROPERTIES if name in self.__dict__}
+        )
+        return block
 
     def mean_colors(self, mask: Mask) -> Array:
         """Colors [N,3], means over directions, at the vertices of a mask [X,Y,Z] with slots."""
@@ -235,6 +243,9 @@ class GridBlock:
             field.bounds, field.resolution, self.vertices[is_stored], density, sh, field.contracted
         )
 
+
+_CACHED_PROPERTIES = [name for name, value in vars(GridBlock).items() if isinstance(value, cached_property)]
+"""Properties of a block that do not depend on its colors: all that are cached."""
 
 GridValues = NDArray[np.floating] | NDArray[np.bool_]
 

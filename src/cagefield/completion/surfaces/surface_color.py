@@ -7,7 +7,6 @@ Vertices whose light grows much get the visible color of the surface over them f
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -74,7 +73,7 @@ def denoise_colors(block: GridBlock, where: Mask, log: Array) -> GridBlock:
     sh, slot = block.sh.copy(), block.slot[where][rows]
     blend = (share[rows] * (total > 0.0))[:, None, None]
     sh[slot] += (blend * (mean - sh[slot])).astype(np.float32)
-    return replace(block, sh=sh)
+    return block.with_coefficients(sh)
 
 
 def colors_along_normals(block: GridBlock, surface: Surfels) -> tuple[Float32, Float32]:

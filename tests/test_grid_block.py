@@ -1,0 +1,38 @@
+"""Grid blocks: properties of the density outlive changes of color."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
+from cagefield.edits import EditStack
+from scenes import ball_field
+
+
+def cached_names() -> list[str]:
+    return [name for name, value in vars(GridBlock).items() if isinstance(value, cached_property)]
+
+
+def test_what_density_determines_is_not_computed_again_for_other_colors() -> None:
+    field = ball_field(radius=0.5)
+    block = extract_block(field, EditStack(), field.bounds)
+    assert {"normals", "surface", "depth"} <= set(cached_names())
+    values = {name: getattr(block, name) for name in cached_names()}
+    mask = block.slot >= 0
+    darker = block.scale_colors(mask, np.full(int(mask.sum()), 0.5))
+    again = replace(darker)
+    for name, value in values.items():
+        assert darker.__dict__[name] is value and name not in again.__dict__
+        np.testing.assert_array_equal(getattr(again, name), value)
+    np.testing.assert_allclose(darker.mean_colors(mask), 0.5 * block.mean_colors(mask), atol=1e-6)
+
+
+def test_another_density_has_properties_of_its_own() -> None:
+    field = ball_field(radius=0.5)
+    block = extract_block(field, EditStack(), field.bounds)
+    assert block.surface.any()
+    emptied = block.with_density(block.solid, np.zeros(int(block.solid.sum()), np.float32))
+    assert not emptied.surface.any() and not emptied.solid.any()
