@@ -17,15 +17,19 @@ from cagefield.completion.surfaces.visibility import (
     count_edited_views,
 )
 from cagefield.compute.cancellation import check_cancelled
+from cagefield.compute.parallel_parts import map_parts
 from cagefield.edits import EditMap
 from cagefield.edits.patch import NewLight
-from cagefield.typing import Array, Mask
+from cagefield.typing import AnyArray, Array, Mask
 
 MAX_TRUSTED_LOG_GAIN = 0.6
 """Gain of light (log) above which the photographed color is noise, and is inpainted."""
 
 LIGHT_NEIGHBORS = 8
 """Number of surfels over which the light on a vertex is averaged."""
+
+PART_VERTICES = 16_384
+"""Number of vertices whose light one thread computes at a time."""
 
 FACING_LOG_WEIGHT = 3.0
 """Log weight of a surfel with the normal of the vertex over one at a right angle to it."""
@@ -58,17 +62,14 @@ class LightChange:
             high = np.ceil(g.max(axis=0) + MAX_LIGHT_DEPTH_VOXELS).astype(np.int64) + 1
             box = tuple(slice(a, max(a, b)) for a, b in zip(low, high, strict=True))
             mask[box] = block.slot[box] >= 0
-            distance, rows = surface.nearest(block.positions(mask), LIGHT_NEIGHBORS, radius)
-            has_surfel = np.isfinite(distance[:, 0])
-            distance, rows = distance[has_surfel], rows[has_surfel]
-            mask[mask] = has_surfel
-            rows = np.where(np.isfinite(distance), rows, rows[:, :1])
-            # Around an edge each side has its own light; a thin object shows the vertices of both sides.
-            facing = np.abs(np.einsum("nkc,nc->nk", surface.normals[rows], block.normals[mask]))
-            weight = np.exp(
-                -0.5 * (distance**2 - distance[:, :1] ** 2) / spacing**2 + FACING_LOG_WEIGHT * facing
-            )
-            log = (weight * logs[rows]).sum(axis=1) / weight.sum(axis=1)
+            points, normals = block.positions(mask), block.normals[mask]
+
+            def mean_logs(part: slice) -> Array:
+                return _mean_logs(surface, logs, points[part], normals[part], radius, spacing)
+
+            log = np.concatenate(map_parts(mean_logs, len(points), PART_VERTICES))
+            has_surfel = np.isfinite(log)
+            mask[mask], log = has_surfel, log[has_surfel]
         return cls(mask, log)
 
     def combine(self, other: LightChange) -> LightChange:
@@ -99,6 +100,25 @@ class LightChange:
         values = np.zeros(block.shape)
         values[self.mask] = self.log_ratio
         return values
+
+
+def _mean_logs(
+    surface: Surfels, logs: Array, points: Array, normals: AnyArray, radius: float, spacing: float
+) -> Array:
+    """Means [M] of log ratios [N] over the surfels around vertices at points [M,3] with normals [M,3].
+
+    NaN where no surfel is within `radius`, world units.
+    """
+    distance, rows = surface.nearest(points, LIGHT_NEIGHBORS, radius)
+    has_surfel = np.isfinite(distance[:, 0])
+    distance, rows = distance[has_surfel], rows[has_surfel]
+    rows = np.where(np.isfinite(distance), rows, rows[:, :1])
+    # Around an edge each side has its own light; a thin object shows the vertices of both sides.
+    facing = np.abs(np.einsum("nkc,nc->nk", surface.normals[rows], normals[has_surfel]))
+    weight = np.exp(-0.5 * (distance**2 - distance[:, :1] ** 2) / spacing**2 + FACING_LOG_WEIGHT * facing)
+    means = np.full(len(points), np.nan)
+    means[has_surfel] = (weight * logs[rows]).sum(axis=1) / weight.sum(axis=1)
+    return means
 
 
 def apply_light(block: GridBlock, light: LightChange | None) -> GridBlock:
