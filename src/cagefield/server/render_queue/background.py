@@ -1,7 +1,8 @@
 """Background tasks of the rendering process, for times when no page waits for an image.
 
 It makes its kernels ready, finds the light of the field as soon as there is a cage or while no page asks for
-anything, so that no edit waits for it, measures the lattices of edits, and renders background jobs' pictures.
+anything, and the light around the last cage, so that no edit waits for either; it measures the lattices of
+edits, and renders background jobs' pictures.
 """
 
 from __future__ import annotations
