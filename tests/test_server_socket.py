@@ -157,7 +157,7 @@ def test_two_pages_show_the_same_and_look_from_their_own_cameras(server: EditorS
 
 
 def both_see(*pages: PageClient, entry: int) -> dict[str, Any]:
-    """The state of all pages, one and the same, whose history stands at an entry; so do their next pictures."""
+    """The state of all pages, one and the same, at an entry of the history; their next pictures are, too."""
     states = [client.state(lambda s: s["entry"] == entry) for client in pages]
     assert all(state == states[0] for state in states)
     for client in pages:
@@ -171,7 +171,7 @@ def both_see(*pages: PageClient, entry: int) -> dict[str, Any]:
 
 @pytest.mark.nightly
 def test_two_pages_drag_undo_redo_and_save_a_lattice(server: EditorServer) -> None:
-    """Each page drags a row of one lattice, the other undoes and redoes; the file of it gives both the same."""
+    """Each page drags a row of one lattice, one undoes, one redoes; its file gives both of them the same."""
     lattice = {"points": [2, 2, 3], "interpolation": "bspline"}
     edit = BALL | {"inner": {"center": [0, 0, 0], "size": 1.1, "lattice": lattice}}
     rows = [{"kind": "move_points", "points": [8, 9], "by": [0.0, 0.15, 0.1]}]
