@@ -156,6 +156,62 @@ def test_two_pages_show_the_same_and_look_from_their_own_cameras(server: EditorS
         assert states[0]["entry"] == states[1]["entry"]
 
 
+def both_see(*pages: PageClient, entry: int) -> dict[str, Any]:
+    """The state of all pages, one and the same, at an entry of the history; their next pictures are, too."""
+    states = [client.state(lambda s: s["entry"] == entry) for client in pages]
+    assert all(state == states[0] for state in states)
+    for client in pages:
+        client.until(
+            lambda m: m["type"] == "picture" and m["final"] and m["revision"] >= states[0]["revision"]
+        )
+    for client in pages[1:]:
+        np.testing.assert_array_equal(pixels(client), pixels(pages[0]))
+    return states[0]
+
+
+@pytest.mark.nightly
+def test_two_pages_drag_undo_redo_and_save_a_lattice(server: EditorServer) -> None:
+    """Each page drags a row of one lattice, one undoes, one redoes; its file gives both of them the same."""
+    lattice = {"points": [2, 2, 3], "interpolation": "bspline"}
+    edit = BALL | {"inner": {"center": [0, 0, 0], "size": 1.1, "lattice": lattice}}
+    rows = [{"kind": "move_points", "points": [8, 9], "by": [0.0, 0.15, 0.1]}]
+    rows.append({"kind": "move_points", "points": [10, 11], "by": [0.1, 0.0, 0.2]})
+    with page(server) as (one, hello), page(server) as (two, _):
+        loaded = load(one, edit)
+        number, entry, points = loaded["edits"][0]["id"], loaded["entry"], []
+        for client in (one, two):
+            client.look_from(hello)
+        two.state(lambda s: s["entry"] == entry)
+        for client in (one, two):
+            client.final()
+        plain = pixels(one)
+        for drag, (mover, row) in enumerate(zip((one, two), rows, strict=True), 1):
+            mover.send("drag_begin", drag=drag, edit=number, target="field")
+            mover.send("drag", drag=drag, seq=1, operation=row)
+            assert mover.until(lambda m: m["type"] == "dragged")["part"] == 1.0
+            mover.send("drag_end", drag=drag, seq=2, operation=row)
+            state = both_see(one, two, entry=entry + drag)
+            points.append(state["edits"][0]["points"]["deformed"])
+        moved = pixels(two)
+        assert points[0] != points[1] and np.abs(moved.astype(int) - plain).max() > 50
+        two.send("command", name="undo")
+        assert both_see(one, two, entry=entry + 1)["edits"][0]["points"]["deformed"] == points[0]
+        one.send("command", name="redo")
+        assert both_see(one, two, entry=entry + 2)["edits"][0]["points"]["deformed"] == points[1]
+        np.testing.assert_array_equal(pixels(one), moved)
+        one.send("command", name="save")
+        states = [client.state(lambda s: s["saved"]) for client in (one, two)]
+        assert states[0] == states[1]
+        text = (Path(states[0]["path"]) / "edits.yaml").read_text()
+        for name in ("undo", "undo"):
+            one.send("command", name=name)
+        both_see(one, two, entry=entry)
+        two.send("load_edits", text=text)  # a replay of the file
+        replayed = both_see(one, two, entry=entry + 1)
+        assert replayed["edits"][0]["points"]["deformed"] == points[1]
+        np.testing.assert_array_equal(pixels(two), moved)
+
+
 def test_a_page_that_shows_slowly_has_one_picture_waiting_and_two_at_rest(server: EditorServer) -> None:
     with page(server, slow=True) as (client, hello):
         seq, after, end = 0, 0, time.monotonic() + PATIENCE

@@ -2,8 +2,10 @@
 
     python -m benchmarks.edits.painted_selections cone SCENE --out digger_move_painted_cone.yaml
     python -m benchmarks.edits.painted_selections flower SCENE --out plant_turn_painted_flower.yaml
+    python -m benchmarks.edits.painted_selections helmet SCENE --out docs/edits/biker_painted_helmet.yaml
 
-SCENE: a folder of the digger, or of the plant, trained. Both files are examples of the package.
+SCENE: a folder of the digger, or of the plant, trained; their files are examples of the package. For the
+helmet, `biker.compressed.ply` of PlayCanvas' examples, imported.
 
 Strokes are those of a person with the brush of the editor, in shares of the image of a camera; they paint as
 the editor's brush does, depth-limited, each added to the others, cut to a range of hues, grown. The cage is
@@ -42,16 +44,17 @@ FACES = 160
 """Triangles of a mesh cage, at most."""
 
 DEPTH_TOLERANCE = 1.0
-"""Depth limit of the brush, in radii of an element."""
+"""Depth limit of the brush, in radii of an element, where a part names none."""
 
 
 @dataclass(frozen=True)
 class Painted:
     """A part as it is painted: strokes seen from eyes, hues, steps of growth, its cage, its motion.
 
-    Strokes are in shares of the image of the camera at their eye, which looks at the scene's center. Without
-    a range of hues all that is painted stays. `margin` of the cage is in cells. The motion turns about
-    `pivot`, None for that of the cage.
+    Strokes are in shares of the image of the camera at their eye, which looks at `target`; its picture has
+    `pixels` and a field of view `fov_x` in radians. Without a range of hues all that is painted stays. The
+    depth limit of the brush, `depth`, is in radii of an element; `margin` of the cage is in cells. The motion
+    turns about `pivot`, None for that of the cage.
     """
 
     title: str
@@ -64,9 +67,16 @@ class Painted:
     rotate_deg: Vec3 = (0.0, 0.0, 0.0)
     pivot: Vec3 | None = None
     discrete: bool = False
+    target: Vec3 = (0.0, 0.0, 0.0)
+    up: Vec3 = (0.0, 0.0, 1.0)
+    pixels: tuple[int, int] = (PIXELS, PIXELS)
+    fov_x: float = FOV_X_RAD
+    depth: float = DEPTH_TOLERANCE
+    field: str = "a field trained on 60 photos"
 
 
 CONE_EYES: tuple[Vec3, Vec3] = ((3.2, 1.6, 1.3), (1.2, 3.4, 1.2))
+HELMET_EYES: tuple[Vec3, Vec3, Vec3] = ((-1.6, -1.4, 2.6), (-3.0, -1.4, 0.6), (-2.0, -1.6, -2.2))
 FLOWER_EYES: tuple[Vec3, Vec3] = ((2.0, -3.1, 1.6), (-2.6, 2.4, 1.9))
 
 PAINTED: dict[str, Painted] = {
@@ -98,6 +108,26 @@ PAINTED: dict[str, Painted] = {
         rotate_deg=(0.0, 25.0, 0.0),
         pivot=(-0.18, 0.11, 0.83),
     ),
+    "helmet": Painted(
+        "turn the painted helmet",
+        (
+            (HELMET_EYES[0], Stroke(((0.5, 0.47), (0.53, 0.53), (0.53, 0.6)), 0.08)),
+            (HELMET_EYES[0], Stroke(((0.62, 0.5), (0.66, 0.53)), 0.03)),
+            (HELMET_EYES[1], Stroke(((0.36, 0.47), (0.36, 0.56), (0.42, 0.58)), 0.09)),
+            (HELMET_EYES[1], Stroke(((0.48, 0.45), (0.52, 0.5), (0.5, 0.56)), 0.05)),
+            (HELMET_EYES[2], Stroke(((0.4, 0.44), (0.38, 0.52), (0.4, 0.57)), 0.09)),
+        ),
+        "mesh",
+        (-0.03, 0.0, 0.1),
+        grown=1,
+        rotate_deg=(0.0, -40.0, 0.0),
+        target=(-0.25, -1.4, 0.2),
+        up=(0.0, -1.0, 0.0),
+        pixels=(320, 480),
+        fov_x=0.5,
+        depth=3.0,
+        field="a capture in splats",
+    ),
 }
 """Painted parts, by the name that the command line takes."""
 
@@ -105,10 +135,13 @@ PAINTED: dict[str, Painted] = {
 def select(scene: Scene, elements: Elements, painted: Painted) -> Mask:
     """Mask [N] of the elements of a scene without edits that are painted."""
     seen = deformed_positions(elements.positions, EditStack())
-    reach = DEPTH_TOLERANCE * np.maximum(elements.radii, elements.cell_edge)[seen.element]
+    reach = painted.depth * np.maximum(elements.radii, elements.cell_edge)[seen.element]
     mask = np.zeros(len(elements), bool)
     for eye, stroke in painted.strokes:
-        camera = Camera.look_at(eye, (0, 0, 0), width=PIXELS, height=PIXELS, fov_x=FOV_X_RAD)
+        width, height = painted.pixels
+        camera = Camera.look_at(
+            eye, painted.target, painted.up, width=width, height=height, fov_x=painted.fov_x
+        )
         frame = scene.render(camera)
         depth = np.where(frame.opacity > 0.5, frame.depth, np.inf).astype(np.float32)
         mask |= elements_in_region(stroke, camera, seen, len(elements), depth=depth, tolerance=reach)
@@ -148,7 +181,7 @@ def text_of(edits: EditStack, comments: Sequence[str]) -> str:
 class Arguments:
     """A painted part of a trained scene, written as an edit file."""
 
-    name: tyro.conf.Positional[Literal["cone", "flower"]]
+    name: tyro.conf.Positional[Literal["cone", "flower", "helmet"]]
     scene: tyro.conf.Positional[Path]
     out: Path | None = None
     """Edit file; left out, it is printed."""
@@ -162,8 +195,8 @@ def main() -> None:
     mask = select(scene, elements, painted)
     print(f"{np.count_nonzero(mask)} of {len(mask)} elements painted")
     comments = [
-        f"{painted.title.capitalize()}: {len(painted.strokes)} strokes of the brush on a field trained on 60",
-        f"photos, and the {painted.cage} that the key which makes a selection a cage puts around them:",
+        f"{painted.title.capitalize()}: {len(painted.strokes)} strokes of the brush on {painted.field},",
+        f"and the {painted.cage} that the key which makes a selection a cage puts around them:",
         f"  python -m benchmarks.edits.painted_selections {arguments.name} SCENE",
     ]
     text = text_of(EditStack([edit_of(elements, mask, painted)]), comments)

@@ -13,7 +13,7 @@ from cagefield.geometry.cage import Cage, LatticeCage
 from cagefield.typing import Array, Float32, Mask
 from cagefield.warps.cage_maps import flow_between, inner_map_between
 from cagefield.warps.falloff import Falloff
-from cagefield.warps.free_form_nodes import flow_nodes
+from cagefield.warps.free_form_nodes import flow_arguments, node_places
 from cagefield.warps.interfaces import InnerMap, NoInnerMap
 from cagefield.warps.lattice_flow import LatticeFlow, outer_distance, outer_distance_gradient
 from cagefield.warps.lattice_motion import Piece, pieces_between
@@ -109,24 +109,38 @@ class LatticeShell:
         """Displacements to canonical space [R^3,3], x fastest, of the nodes of a `Lattice`."""
         if not self.outer.is_affine:
             return self._sampled_exactly(resolution)
-        from cagefield.warps.kernels.lattice_nodes import ITERATIONS, sample_nodes
+        from cagefield.warps.kernels.lattice_nodes import ITERATIONS, lattice_nodes_back
 
         around, flow = self.around, self.around.flow
         A, b = self.inner.affine
-        confines, (origin, frame) = flow.confines, self.outer.frame
+        confines = flow.confines
         outer = np.concatenate([confines.center[None], confines.inverse, confines.frame])
-        out = flow_nodes(flow.velocities, flow.steps, self.outer, outer, ITERATIONS, resolution)
-        inner = (confines.heights[None], b[None], np.linalg.inv(A), A, origin[None], frame)
-        sample_nodes(
-            np.concatenate([outer, *inner]),
-            around.padded,
-            self.deformed.interpolation == "linear",
-            around.face_table,
+        material = np.concatenate([(confines.center - b)[None], confines.frame.T]) @ np.linalg.inv(A).T
+        table = np.zeros((*around.face_table.shape[:-1], 4), dtype=np.float32)
+        table[..., :3] = around.face_table @ confines.inverse.T
+        out = np.empty((resolution**3, 3), dtype=np.float32)
+        lattice_nodes_back(
+            flow_arguments(flow.velocities, flow.steps, self.outer, outer, ITERATIONS, resolution),
+            (*self._lattice(), node_places(self.outer, resolution), np.concatenate([b[None], A])),
+            (
+                material.astype(np.float32),
+                confines.heights.astype(np.float32),
+                table.reshape(-1),
+                table.shape[1] - 1,
+            ),
             1.5 * around.largest + 1e-9,
             resolution,
             out,
         )
         return out
+
+    def _lattice(self) -> tuple[Array, Float32, Array, bool]:
+        """(padded deformed control points, these less a center in flat rows of four, the center, linear)."""
+        padded = self.around.padded
+        center = self.deformed.control_points.mean(axis=0)
+        rows = np.zeros((*padded.shape[:-1], 4), dtype=np.float32)
+        rows[..., :3] = padded - center
+        return padded, rows.reshape(-1), center, self.deformed.interpolation == "linear"
 
     def _sampled_exactly(self, resolution: int) -> Float32:
         origin, frame = self.outer.frame

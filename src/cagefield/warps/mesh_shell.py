@@ -12,7 +12,7 @@ from cagefield.geometry.mesh_cage import MeshCage
 from cagefield.typing import Array, Float32
 from cagefield.warps.cage_maps import flow_between, inner_map_between
 from cagefield.warps.falloff import Falloff
-from cagefield.warps.free_form_nodes import flow_nodes
+from cagefield.warps.free_form_nodes import flow_arguments
 from cagefield.warps.interfaces import InnerMap, NoInnerMap
 from cagefield.warps.mesh_flow import (
     MeshFlow,
@@ -115,7 +115,7 @@ class MeshShell:
 
     def sample(self, resolution: int) -> Float32:
         """Displacements to canonical space [R^3,3], x fastest, of the nodes of a `Lattice`; in float32."""
-        from cagefield.warps.kernels.lattice_nodes import mesh_iterations
+        from cagefield.warps.kernels.lattice_nodes import flow_nodes_back, mesh_iterations
 
         if not self._pieces:
             return np.zeros((resolution**3, 3), dtype=np.float32)
@@ -123,7 +123,9 @@ class MeshShell:
         center, inverse, frame = self._confines
         frames = np.concatenate([center[None], inverse, frame])
         iterations = mesh_iterations(flow.strain)
-        out = flow_nodes(flow.velocities, flow.steps, self.outer, frames, iterations, resolution)
+        out = np.empty((resolution**3, 3), dtype=np.float32)
+        arguments = flow_arguments(flow.velocities, flow.steps, self.outer, frames, iterations, resolution)
+        flow_nodes_back(arguments, resolution, out)
         grid, ends = out.reshape(*3 * (resolution,), 3), [0, -1]
         grid[ends] = grid[:, ends] = grid[:, :, ends] = 0.0  # the outer faces, which the kernel rounds
         return out

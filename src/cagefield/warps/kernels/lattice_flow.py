@@ -155,7 +155,7 @@ def flow_points(begin, end, grids, steps, backwards, enough, z, J):
 
 
 @njit(**FAST)
-def _spline_weights(shape, linear, u, weights):
+def spline_weights(shape, linear, u, weights):
     """Writes the weights of the control points at u [3], weights [3,9]: 4 values, 4 slopes, first point."""
     for a in range(3):
         cells = shape[2 - a] - 3
@@ -180,26 +180,9 @@ def _spline_weights(shape, linear, u, weights):
 
 
 @njit(**FAST)
-def _lattice_value(P, linear, u, x, weights):
-    """Writes x(u) [3] alone, see `lattice_point`."""
-    _spline_weights(P.shape, linear, u, weights)
-    i, j, k = int(weights[0, 8]), int(weights[1, 8]), int(weights[2, 8])
-    wx, wy, wz = weights[0], weights[1], weights[2]
-    x0, x1, x2 = 0.0, 0.0, 0.0
-    for c in range(4):
-        for b in range(4):
-            row, w = P[k + c, j + b], wy[b] * wz[c]
-            w0, w1, w2, w3 = w * wx[0], w * wx[1], w * wx[2], w * wx[3]
-            x0 += w0 * row[i, 0] + w1 * row[i + 1, 0] + w2 * row[i + 2, 0] + w3 * row[i + 3, 0]
-            x1 += w0 * row[i, 1] + w1 * row[i + 1, 1] + w2 * row[i + 2, 1] + w3 * row[i + 3, 1]
-            x2 += w0 * row[i, 2] + w1 * row[i + 1, 2] + w2 * row[i + 2, 2] + w3 * row[i + 3, 2]
-    x[0], x[1], x[2] = x0, x1, x2
-
-
-@njit(**FAST)
 def lattice_point(P, linear, u, x, J, weights):
     """Writes x(u) [3] and dx/du [3,3] of padded control points P, see `bspline_lattice.padded`."""
-    _spline_weights(P.shape, linear, u, weights)
+    spline_weights(P.shape, linear, u, weights)
     i, j, k = int(weights[0, 8]), int(weights[1, 8]), int(weights[2, 8])
     wx, wy, wz = weights[0], weights[1], weights[2]
     for c in range(3):
@@ -254,31 +237,6 @@ def invert_lattice_point(P, linear, target, u, enough, work):
                 return False
             lattice_point(P, linear, u, x, J, weights)
     return left <= enough * enough
-
-
-@njit(**FAST)
-def invert_lattice_nearby(P, linear, target, u, enough, work):
-    """`invert_lattice_point` from a start u [3] close to the solution: two steps with the slope at the start,
-    then Newton's method where that does not suffice."""
-    x, J, B, weights = work[0, :3], work[1:4, :3], work[4:7, :3], work[7:10]
-    lattice_point(P, linear, u, x, J, weights)
-    r0, r1, r2 = x[0] - target[0], x[1] - target[1], x[2] - target[2]
-    left = r0 * r0 + r1 * r1 + r2 * r2
-    if left > enough * enough:
-        _inverse(J, B)
-        for _ in range(2):
-            for i in range(3):
-                step = B[i, 0] * r0 + B[i, 1] * r1 + B[i, 2] * r2
-                u[i] -= min(max(step, -0.25), 0.25)
-            _lattice_value(P, linear, u, x, weights)
-            r0, r1, r2 = x[0] - target[0], x[1] - target[1], x[2] - target[2]
-            left = r0 * r0 + r1 * r1 + r2 * r2
-            if left <= enough * enough:
-                return True
-        for i in range(3):
-            u[i] = min(max(u[i], -0.5), 1.5)
-        return invert_lattice_point(P, linear, target, u, enough, work)
-    return True
 
 
 @parallel_njit(lambda P, linear, targets, u, *_: len(u), **FAST)

@@ -1,4 +1,8 @@
-"""Numba kernel of a lattice shell's node lattice; see `lattice_shell`."""
+"""Numba kernels of the node lattices of lattices and meshes; see `lattice_shell` and `mesh_shell`.
+
+A line of up to `NODE_LANES` nodes along x goes through together: the innermost loops run over it. All is in
+float32, in the coordinates z in [-1,1]^3 of the outer cage, but for what is inside of a lattice.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +12,12 @@ import numpy as np
 
 from cagefield.compute.numba_cache import FAST, njit
 from cagefield.compute.parallel_kernels import parallel_njit
-from cagefield.warps.kernels.lattice_flow import invert_lattice_nearby
+from cagefield.warps.kernels.interpolated_rows import blend_pairs, blend_spline
+from cagefield.warps.kernels.lattice_flow import invert_lattice_point, spline_weights
 
-U = np.uintp
+U, F = np.uintp, np.float32
 
-NODES_PER_BATCH = 64
+NODE_LANES = 64
 
 ITERATIONS = 2
 """Iterations of a step: each takes the error times h/2 |dv/dz|, and Aitken's extrapolation ends them."""
@@ -20,8 +25,17 @@ ITERATIONS = 2
 MANY_STRAIN = 0.6
 """h |dv/dz| of a mesh's flow from which its steps take one iteration more."""
 
-MOST_RATIO = np.float32(0.5)
+MOST_RATIO = F(0.5)
 """Most ratio of two changes in a row from which the rest is extrapolated."""
+
+ENOUGH = F(2e-5)
+"""Last change of z in the inversion of a correction: 1e-5 of the outer cage."""
+
+MOST_CORRECTIONS = 40
+
+NEAR_ENOUGH = F(3e-4)
+"""Residual, as a share of the outer cage's size (the sum of its edges), from which one more step of Newton's
+method ends the inversion of a lattice: the step squares it."""
 
 
 def mesh_iterations(strain: float) -> int:
@@ -34,196 +48,281 @@ def mesh_iterations(strain: float) -> int:
 
 
 @njit(**FAST)
-def _flow_back(grid, nodes, steps, z, room, iterations):
-    """Takes z [N,4] float32 (x, y, z, -) back through all slices, in place; room [3,N,4] for velocities.
+def _velocities(grid, nodes, first, share, count, z, before, v, at, weights):
+    """Writes the velocities v [3,L] of a slice at z + share before [3,L], trilinear between its nodes.
 
-    The loop over the nodes is the innermost: a node's own steps wait for each other. With d and e the last
-    two changes of the velocity, and c = d . e / d . d, what is still to come is c / (1 - c) e (Aitken).
+    at [L] int32 and weights [5,L] float32 are room.
+    """
+    line, plane = np.int32(4 * nodes), np.int32(4 * nodes * nodes)
+    cells = F(nodes - U(1))
+    half, one, zero, top = F(0.5) * cells, F(1.0), F(0.0), cells - F(1e-3)
+    for l in range(count):
+        s0 = min(max((z[0, l] + share * before[0, l] + one) * half, zero), top)
+        s1 = min(max((z[1, l] + share * before[1, l] + one) * half, zero), top)
+        s2 = min(max((z[2, l] + share * before[2, l] + one) * half, zero), top)
+        i, j, k = np.int32(s0), np.int32(s1), np.int32(s2)
+        b, c = s1 - F(j), s2 - F(k)
+        at[l] = np.int32(4) * i + line * j + plane * k
+        weights[0, l] = s0 - F(i)
+        weights[1, l] = (one - b) * (one - c)
+        weights[2, l] = b * (one - c)
+        weights[3, l] = (one - b) * c
+        weights[4, l] = b * c
+    up, far = U(4) * nodes, U(4) * nodes * nodes
+    for l in range(count):
+        p = first + U(at[l])
+        v[0, l], v[1, l], v[2, l] = blend_pairs(
+            grid,
+            (p, p + up, p + far, p + far + up),
+            (weights[1, l], weights[2, l], weights[3, l], weights[4, l]),
+            weights[0, l],
+        )
+
+
+@njit(**FAST)
+def _flow_back(grid, nodes, steps, iterations, count, z, room, at, weights):
+    """Takes z [3,L] back through all slices, in place; room [3,3,L] for velocities.
+
+    With d and e the last two changes of the velocity, and c = d . e / d . d, what is still to come is
+    c / (1 - c) e (Aitken).
     """
     size = U(4) * nodes * nodes * nodes
-    line, plane = U(4) * nodes, U(4) * nodes * nodes
-    cells = np.float32(nodes - U(1))
-    half, one, zero, top = np.float32(0.5) * cells, np.float32(1.0), np.float32(0.0), cells - np.float32(1e-3)
+    zero, one, two = F(0.0), F(1.0), F(2.0)
     v, before, older = room[0], room[1], room[2]
     room[:] = zero
     for step in range(len(steps)):
-        at = U(len(steps) - 1 - step)
-        first, share = at * size, np.float32(-0.5) * np.float32(steps[at])
+        n = len(steps) - 1 - step
+        first, share = U(n) * size, F(-0.5) * F(steps[n])
         for _ in range(iterations + (1 if step == 0 else 0)):
             v, before, older = older, v, before
-            for l in range(U(len(z))):
-                s0 = min(max((z[l, 0] + share * before[l, 0] + one) * half, zero), top)
-                s1 = min(max((z[l, 1] + share * before[l, 1] + one) * half, zero), top)
-                s2 = min(max((z[l, 2] + share * before[l, 2] + one) * half, zero), top)
-                i, j, k = U(s0), U(s1), U(s2)
-                a, b, c = s0 - np.float32(i), s1 - np.float32(j), s2 - np.float32(k)
-                p = first + U(4) * i + line * j + plane * k
-                w00, w10, w01, w11 = (one - b) * (one - c), b * (one - c), (one - b) * c, b * c
-                d00, d10, d01, d11 = a * w00, a * w10, a * w01, a * w11
-                w00, w10, w01, w11 = w00 - d00, w10 - d10, w01 - d01, w11 - d11
-                for n in range(U(4)):
-                    low = w00 * grid[p + n] + w10 * grid[p + line + n]
-                    low += d00 * grid[p + U(4) + n] + d10 * grid[p + line + U(4) + n]
-                    high = w01 * grid[p + plane + n] + w11 * grid[p + plane + line + n]
-                    high += d01 * grid[p + plane + U(4) + n] + d11 * grid[p + plane + line + U(4) + n]
-                    v[l, n] = low + high
-        for l in range(U(len(z))):
-            both, square = zero, np.float32(1e-30)
-            for n in range(U(4)):
-                d = before[l, n] - older[l, n]
-                both += d * (v[l, n] - before[l, n])
-                square += d * d
-            c = min(max(both / square, -MOST_RATIO), MOST_RATIO)
+            _velocities(grid, nodes, first, share, count, z, before, v, at, weights)
+        for l in range(count):
+            d0, d1, d2 = before[0, l] - older[0, l], before[1, l] - older[1, l], before[2, l] - older[2, l]
+            e0, e1, e2 = v[0, l] - before[0, l], v[1, l] - before[1, l], v[2, l] - before[2, l]
+            c = (d0 * e0 + d1 * e1 + d2 * e2) / (d0 * d0 + d1 * d1 + d2 * d2 + F(1e-30))
+            c = min(max(c, -MOST_RATIO), MOST_RATIO)
             c /= one - c
-            for n in range(U(4)):
-                v[l, n] += c * (v[l, n] - before[l, n])
-                z[l, n] += np.float32(2.0) * share * v[l, n]
+            v[0, l] += c * e0
+            v[1, l] += c * e1
+            v[2, l] += c * e2
+            z[0, l] += two * share * v[0, l]
+            z[1, l] += two * share * v[1, l]
+            z[2, l] += two * share * v[2, l]
 
 
 @njit(**FAST)
-def _uncorrect(X, confines, heights, material, table, most):
-    """Takes X = R^-1(X) [3], in place, with r from a table [6,T,T,3]."""
-    q0, q1, q2 = X[0], X[1], X[2]
-    last = table.shape[1] - 1
-    u, z = np.empty(3), np.empty(3)
-    for _ in range(40):
-        _affine(material, X, u)
-        _affine(confines, X, z)
-        e0 = u[0] - min(max(u[0], 0.0), 1.0)
-        e1 = u[1] - min(max(u[1], 0.0), 1.0)
-        e2 = u[2] - min(max(u[2], 0.0), 1.0)
-        # The face is that of the axis furthest out, or nearest to it within rounding of the cage.
-        f0, f1, f2 = abs(u[0] - 0.5), abs(u[1] - 0.5), abs(u[2] - 0.5)
-        axis = 0 if f0 >= f1 and f0 >= f2 else 1 if f1 >= f2 else 2
-        face = 2 * axis + (1 if u[axis] > 0.5 else 0)
-        s = min(max(u[axis - 2], 0.0), 1.0) * last  # the next axis, counted round
-        t = min(max(u[axis - 1], 0.0), 1.0) * last
-        i, j = min(int(s), last - 1), min(int(t), last - 1)
-        a, b = s - i, t - j
-        square, inverse = 0.0, 0.0
-        for n in range(3):
-            d = material[4 + n, 0] * e0 + material[4 + n, 1] * e1 + material[4 + n, 2] * e2
-            square += d * d
-            f = 0.5 * heights[n] * max(1.0 - z[n] * z[n], 1e-12)
-            f = 1.0 / (f * f)
-            inverse += f * f
-        g = 1.0 / (1.0 + np.sqrt(square * np.sqrt(inverse)))
-        rho = g * g * (3.0 - 2.0 * g)
-        w00, w10, w01, w11 = (1.0 - a) * (1.0 - b), a * (1.0 - b), (1.0 - a) * b, a * b
-        near, far = table[face, i], table[face, i + 1]
-        n0 = q0 - rho * (w00 * near[j, 0] + w01 * near[j + 1, 0] + w10 * far[j, 0] + w11 * far[j + 1, 0])
-        n1 = q1 - rho * (w00 * near[j, 1] + w01 * near[j + 1, 1] + w10 * far[j, 1] + w11 * far[j + 1, 1])
-        n2 = q2 - rho * (w00 * near[j, 2] + w01 * near[j + 1, 2] + w10 * far[j, 2] + w11 * far[j + 1, 2])
-        change = max(abs(n0 - X[0]), abs(n1 - X[1]), abs(n2 - X[2]))
-        X[0], X[1], X[2] = n0, n1, n2
-        if change <= most:
+def _start(batch, places, resolution, z):
+    """Writes z [3,L] of a line of nodes; (number of the first, how many).
+
+    places [4,3]: z of the first node, dz by a node along each axis.
+    """
+    parts = (resolution + NODE_LANES - 1) // NODE_LANES
+    row, first = batch // parts, batch % parts * NODE_LANES
+    count = min(NODE_LANES, resolution - first)
+    j, k = row % resolution, row // resolution
+    for m in range(3):
+        from_here = places[0, m] + places[1, m] * first + places[2, m] * j + places[3, m] * k
+        for l in range(count):
+            z[m, l] = F(from_here + places[1, m] * l)
+    return row * resolution + first, count
+
+
+def _lines(*args: Any) -> int:
+    """Lines of the nodes of a cube whose resolution is the last argument but one."""
+    resolution = args[-2]
+    return int(resolution**2 * ((resolution + NODE_LANES - 1) // NODE_LANES))
+
+
+@parallel_njit(_lines, **FAST)
+def flow_nodes_back(begin, end, flow, resolution, out):
+    """Writes Phi^-1(x) - x [R^3,3] of nodes x of a box.
+
+    flow: grid [K N^3 4] float32, nodes N, steps [K], its velocities (x fastest, padded to 4) and steps;
+    iterations of each step; places [4,3], z of the first node and dz by a node along each axis; frame [3,3]
+    float32, dx/dz.
+    """
+    grid, nodes, steps, iterations, places, frame = flow
+    z, start, room = (
+        np.empty((3, NODE_LANES), F),
+        np.empty((3, NODE_LANES), F),
+        np.empty((3, 3, NODE_LANES), F),
+    )
+    at, weights = np.empty(NODE_LANES, np.int32), np.empty((5, NODE_LANES), F)
+    for batch in range(begin, end):
+        first, count = _start(batch, places, resolution, start)
+        z[:] = start
+        _flow_back(grid, nodes, steps, iterations, U(count), z, room, at, weights)
+        for l in range(count):
+            d0, d1, d2 = z[0, l] - start[0, l], z[1, l] - start[1, l], z[2, l] - start[2, l]
+            for m in range(3):
+                out[first + l, m] = frame[m, 0] * d0 + frame[m, 1] * d1 + frame[m, 2] * d2
+
+
+@njit(**FAST)
+def _uncorrect(count, q, edges, around, z, at, weights):
+    """Writes z = R^-1(q) [3,L], with r from a table.
+
+    edges [3,3] float32: dx/du; around: as of `lattice_nodes_back`; at [L] int32, weights [5,L] float32: room.
+    """
+    material, heights, table, last = around
+    zero, half, one = F(0.0), F(0.5), F(1.0)
+    side = np.int32(last + 1)
+    end = F(last)
+    z[:] = q
+    up = U(4) * U(last + 1)
+    for _ in range(MOST_CORRECTIONS):
+        for l in range(count):
+            z0, z1, z2 = z[0, l], z[1, l], z[2, l]
+            u0 = material[0, 0] + material[1, 0] * z0 + material[2, 0] * z1 + material[3, 0] * z2
+            u1 = material[0, 1] + material[1, 1] * z0 + material[2, 1] * z1 + material[3, 1] * z2
+            u2 = material[0, 2] + material[1, 2] * z0 + material[2, 2] * z1 + material[3, 2] * z2
+            c0, c1, c2 = min(max(u0, zero), one), min(max(u1, zero), one), min(max(u2, zero), one)
+            e0, e1, e2 = u0 - c0, u1 - c1, u2 - c2
+            d0 = edges[0, 0] * e0 + edges[0, 1] * e1 + edges[0, 2] * e2
+            d1 = edges[1, 0] * e0 + edges[1, 1] * e1 + edges[1, 2] * e2
+            d2 = edges[2, 0] * e0 + edges[2, 1] * e1 + edges[2, 2] * e2
+            f0 = heights[0] * max(half * (one - z0 * z0), F(1e-12))
+            f1 = heights[1] * max(half * (one - z1 * z1), F(1e-12))
+            f2 = heights[2] * max(half * (one - z2 * z2), F(1e-12))
+            least = min(f0, min(f1, f2))
+            f0, f1, f2 = least / f0, least / f1, least / f2
+            f0, f1, f2 = f0 * f0, f1 * f1, f2 * f2
+            g = least / (
+                least + np.sqrt((d0 * d0 + d1 * d1 + d2 * d2) * np.sqrt(f0 * f0 + f1 * f1 + f2 * f2))
+            )
+            # The face is that of the axis furthest out, or nearest to it within rounding of the cage.
+            a0, a1, a2 = abs(u0 - half), abs(u1 - half), abs(u2 - half)
+            by_x = a0 >= a1 and a0 >= a2
+            by_y = a1 >= a2
+            out = u0 if by_x else u1 if by_y else u2
+            s = end * (c1 if by_x else c2 if by_y else c0)  # the next axis, counted round
+            t = end * (c2 if by_x else c0 if by_y else c1)
+            face = np.int32(0) if by_x else np.int32(2) if by_y else np.int32(4)
+            face += np.int32(1) if out > half else np.int32(0)
+            i, j = np.int32(min(s, end - F(1e-3))), np.int32(min(t, end - F(1e-3)))
+            at[l] = np.int32(4) * ((face * side + i) * side + j)
+            a, rho = s - F(i), g * g * (F(3.0) - F(2.0) * g)
+            weights[0, l] = t - F(j)
+            weights[1, l] = rho * (one - a)
+            weights[2, l] = rho * a
+        change = zero
+        for l in range(count):
+            p = U(at[l])
+            r0, r1, r2 = blend_pairs(table, (p, p + up), (weights[1, l], weights[2, l]), weights[0, l])
+            r0, r1, r2 = q[0, l] - r0, q[1, l] - r1, q[2, l] - r2
+            change = max(change, max(abs(r0 - z[0, l]), max(abs(r1 - z[1, l]), abs(r2 - z[2, l]))))
+            z[0, l], z[1, l], z[2, l] = r0, r1, r2
+        if change <= ENOUGH:
             break
 
 
-def _batches(*args: Any) -> int:
-    """Batches of the nodes of a cube whose resolution is the last argument but one."""
-    return int((args[-2] ** 3 + NODES_PER_BATCH - 1) // NODES_PER_BATCH)
-
-
 @njit(**FAST)
-def _place(n, place, resolution, x):
-    """Writes the place x [3] of a node."""
-    i, j, k = n % resolution, n // resolution % resolution, n // (resolution * resolution)
-    scale = 1.0 / (resolution - 1)
-    a, b, c = i * scale, j * scale, k * scale
-    for m in range(3):
-        x[m] = place[0, m] + place[1 + m, 0] * a + place[1 + m, 1] * b + place[1 + m, 2] * c
+def _newton(points, shape, linear, x, u, size, weights):
+    """A step of Newton's method from u [3] towards x(u) = x [3] float32, in place; True where that suffices.
 
-
-@njit(**FAST)
-def _affine(rows, x, y):
-    """Writes y [3] = the matrix in rows 1 to 3 times x - row 0."""
-    p0, p1, p2 = x[0] - rows[0, 0], x[1] - rows[0, 1], x[2] - rows[0, 2]
-    for m in range(3):
-        y[m] = rows[1 + m, 0] * p0 + rows[1 + m, 1] * p1 + rows[1 + m, 2] * p2
-
-
-@njit(**FAST)
-def _flow_batch(grid, nodes, steps, frames, iterations, resolution, out, first):
-    """`flow_nodes_back` at nodes from `first`."""
-    confines, place = frames[0:7], frames[7:11]
-    x, u = np.empty(3), np.empty(3)
-    z, room = np.zeros((NODES_PER_BATCH, 4), np.float32), np.empty((3, NODES_PER_BATCH, 4), np.float32)
-    start = np.empty((NODES_PER_BATCH, 3), np.float32)
-    last = min(first + NODES_PER_BATCH, resolution**3)
-    for n in range(first, last):
-        _place(n, place, resolution, x)
-        _affine(confines, x, u)
-        for m in range(3):
-            z[n - first, m] = start[n - first, m] = u[m]
-    _flow_back(grid, nodes, steps, z, room, iterations)
-    for n in range(first, last):
-        d0, d1, d2 = z[n - first, 0], z[n - first, 1], z[n - first, 2]
-        d0, d1, d2 = d0 - start[n - first, 0], d1 - start[n - first, 1], d2 - start[n - first, 2]
-        for m in range(3):
-            out[n, m] = np.float32(
-                confines[4 + m, 0] * d0 + confines[4 + m, 1] * d1 + confines[4 + m, 2] * d2
-            )
-
-
-@parallel_njit(_batches, **FAST)
-def flow_nodes_back(begin, end, grid, nodes, steps, frames, iterations, resolution, out):
-    """Writes Phi^-1(x) - x [R^3,3] of nodes x of a box.
-
-    grid [K N^3 4] float32, nodes N, steps [K]: velocities (x fastest, padded to 4) and steps of the flow;
-    iterations of each step; frames [11,3]: center, dz/dx, dx/dz of the outer cage, then origin and edges of
-    the nodes' box.
+    points: float32, flat, of padded control points of a shape [3], z first; size: length that residuals are
+    compared with.
     """
-    for batch in range(begin, end):
-        first = np.intp(batch) * NODES_PER_BATCH
-        _flow_batch(grid, nodes, steps, frames, iterations, resolution, out, first)
+    for m in range(3):
+        u[m] = min(max(u[m], F(0.0)), F(1.0))
+    spline_weights(shape, linear, u, weights)
+    line = U(4 * shape[2])
+    plane = line * U(shape[1])
+    start = U(4) * U(weights[0, 8]) + line * U(weights[1, 8]) + plane * U(weights[2, 8])
+    x0, x1, x2, a0, a1, a2, b0, b1, b2, c0, c1, c2 = blend_spline(points, start, line, plane, weights)
+    r0, r1, r2 = x[0] - x0, x[1] - x1, x[2] - x2
+    # Cramer's rule, with columns a, b, c.
+    n0, n1, n2 = b1 * c2 - b2 * c1, b2 * c0 - b0 * c2, b0 * c1 - b1 * c0
+    p0, p1, p2 = r1 * c2 - r2 * c1, r2 * c0 - r0 * c2, r0 * c1 - r1 * c0
+    q0, q1, q2 = b1 * r2 - b2 * r1, b2 * r0 - b0 * r2, b0 * r1 - b1 * r0
+    det = a0 * n0 + a1 * n1 + a2 * n2
+    det = F(1.0) / (det if abs(det) > F(1e-30) else F(1e-30))
+    step = F(0.25)
+    u[0] += min(max(det * (r0 * n0 + r1 * n1 + r2 * n2), -step), step)
+    u[1] += min(max(det * (a0 * p0 + a1 * p1 + a2 * p2), -step), step)
+    u[2] += min(max(det * (a0 * q0 + a1 * q1 + a2 * q2), -step), step)
+    return r0 * r0 + r1 * r1 + r2 * r2 <= NEAR_ENOUGH * NEAR_ENOUGH * size * size
 
 
 @njit(**FAST)
-def _sample_batch(frames, P, linear, table, near, resolution, out, first):
-    """`sample_nodes` at nodes from `first`."""
-    confines, heights, material, place = frames[0:7], frames[7], frames[8:15], frames[15:19]
-    work, x, X, u = np.empty((11, 9)), np.empty(3), np.empty(3), np.empty(3)
-    enough = 1e-5 * (abs(place[1, 0]) + abs(place[2, 1]) + abs(place[3, 2]))
-    last = min(first + NODES_PER_BATCH, resolution**3)
-    for n in range(first, last):
-        _place(n, place, resolution, x)
+def _inside(first, count, resolution, q, material, lattice, near, size, room, out):
+    """Displacements of the nodes of a line that are inside of the lattice, over those in `out`.
+
+    Newton's method starts from q, shifted as it was at the node before.
+    """
+    P, points, center, linear, place, box = lattice
+    work, x, vectors, weights = room
+    X, u, shift, guess = vectors[0], vectors[1], vectors[2], vectors[3]
+    i0, j, k = first % resolution, first // resolution % resolution, first // (resolution * resolution)
+    shift[:] = F(0.0)
+    reach = F(near * near)
+    for l in range(count):
+        square = F(0.0)
         for m in range(3):
-            X[m] = x[m] + out[n, m]
-        _affine(material, X, u)
-        e0 = u[0] - min(max(u[0], 0.0), 1.0)
-        e1 = u[1] - min(max(u[1], 0.0), 1.0)
-        e2 = u[2] - min(max(u[2], 0.0), 1.0)
-        square = 0.0
+            guess[m] = material[0, m] + material[1, m] * q[0, l] + material[2, m] * q[1, l]
+            guess[m] += material[3, m] * q[2, l]
+        e0 = guess[0] - min(max(guess[0], F(0.0)), F(1.0))
+        e1 = guess[1] - min(max(guess[1], F(0.0)), F(1.0))
+        e2 = guess[2] - min(max(guess[2], F(0.0)), F(1.0))
         for m in range(3):
-            d = material[4 + m, 0] * e0 + material[4 + m, 1] * e1 + material[4 + m, 2] * e2
+            d = F(box[1 + m, 0]) * e0 + F(box[1 + m, 1]) * e1 + F(box[1 + m, 2]) * e2
             square += d * d
-        inside = False
-        if square <= near * near:
-            for m in range(3):
-                u[m] = min(max(u[m], 0.0), 1.0)
-            if invert_lattice_nearby(P, linear, x, u, enough, work):
-                inside = min(u[0], u[1], u[2]) >= 0.0 and max(u[0], u[1], u[2]) <= 1.0
-        if inside:
-            for m in range(3):
-                X[m] = material[0, m] + material[4 + m, 0] * u[0] + material[4 + m, 1] * u[1]
-                X[m] += material[4 + m, 2] * u[2]
-        elif near > 2e-9:
-            _uncorrect(X, confines, heights, material, table, enough)
+        if square > reach:
+            continue
         for m in range(3):
-            out[n, m] = np.float32(X[m] - x[m])
+            x[m] = place[0, m] + place[1, m] * (i0 + l) + place[2, m] * j + place[3, m] * k
+            X[m] = F(x[m] - center[m])
+            u[m] = guess[m] + shift[m]
+        found = False
+        for _ in range(3):
+            if _newton(points, P.shape, linear, X, u, F(size), weights):
+                found = True
+                break
+        if not found:
+            for m in range(3):
+                work[11, m] = min(max(guess[m], F(0.0)), F(1.0))
+            if not invert_lattice_point(P, linear, x, work[11], 1e-5 * size, work):
+                continue
+            for m in range(3):
+                u[m] = F(work[11, m])
+        for m in range(3):
+            shift[m] = u[m] - guess[m]
+        if min(u[0], u[1], u[2]) >= F(0.0) and max(u[0], u[1], u[2]) <= F(1.0):
+            for m in range(3):
+                y = box[0, m] + box[1 + m, 0] * u[0] + box[1 + m, 1] * u[1] + box[1 + m, 2] * u[2]
+                out[first + l, m] = F(y - x[m])
 
 
-@parallel_njit(_batches, **FAST)
-def sample_nodes(begin, end, frames, P, linear, table, near, resolution, out):
-    """Displacements to canonical space [R^3,3] of the nodes of an outer cage with parallel faces, in place of
-    those by the flow, Phi^-1(x) - x.
+@parallel_njit(_lines, **FAST)
+def lattice_nodes_back(begin, end, flow, lattice, around, near, resolution, out):
+    """Writes displacements to canonical space [R^3,3] of nodes x of a box.
 
-    frames [19,3]: center, dz/dx, dx/dz of the outer cage, heights of its faces over the center, then origin,
-    du/dx, dx/du of the canonical lattice, then origin and edges of the nodes' box; P: padded deformed control
-    points; table: r on the faces; near: distance from the canonical cage after the flow up to which a node
-    may be inside.
+    flow: as of `flow_nodes_back`.
+    lattice: padded deformed control points; these less a center in rows of four float32, flat; the center;
+    whether it is linear; place [4,3], x of the first node and dx by a node along each axis; box [4,3], origin
+    of the canonical lattice and dx/du.
+    around: material [4,3] float32, u at z = 0 and du/dz transposed; heights [3] float32 of the outer cage's
+    faces over its center; table [6 T T 4] float32, r on the faces in z; its T - 1 cells along an axis.
+    near: distance from the canonical cage after the flow up to which a node may be inside.
     """
+    grid, nodes, steps, iterations, places, frame = flow
+    material, place, box = around[0], lattice[4], lattice[5]
+    z, start, q = np.empty((3, NODE_LANES), F), np.empty((3, NODE_LANES), F), np.empty((3, NODE_LANES), F)
+    at, weights = np.empty(NODE_LANES, np.int32), np.empty((5, NODE_LANES), F)
+    room, vectors = np.empty((3, 3, NODE_LANES), F), np.empty((4, 3), F)
+    inversion = np.empty((12, 9)), np.empty(3), vectors, np.empty((3, 9), F)
+    edges = np.empty((3, 3), F)
+    edges[:] = box[1:]
+    size = 0.0
+    for m in range(3):
+        size += (resolution - 1) * np.sqrt(place[1 + m, 0] ** 2 + place[1 + m, 1] ** 2 + place[1 + m, 2] ** 2)
     for batch in range(begin, end):
-        first = np.intp(batch) * NODES_PER_BATCH
-        _sample_batch(frames, P, linear, table, near, resolution, out, first)
+        first, count = _start(batch, places, resolution, start)
+        q[:] = start
+        _flow_back(grid, nodes, steps, iterations, U(count), q, room, at, weights)
+        _uncorrect(U(count), q, edges, around, z, at, weights)
+        for l in range(count):
+            d0, d1, d2 = z[0, l] - start[0, l], z[1, l] - start[1, l], z[2, l] - start[2, l]
+            for m in range(3):
+                out[first + l, m] = frame[m, 0] * d0 + frame[m, 1] * d1 + frame[m, 2] * d2
+        _inside(first, count, resolution, q, material, lattice, near, size, inversion, out)
