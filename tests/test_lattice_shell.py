@@ -173,6 +173,7 @@ def test_flow_backwards_undoes_it() -> None:
     np.testing.assert_allclose(K @ J, np.broadcast_to(np.eye(3), J.shape), atol=1e-8)
 
 
+@pytest.mark.nightly
 def test_nodes_are_the_exact_map_to_less_than_their_interpolation() -> None:
     edit = EDITS["bend 90"].replace(lattice=48)
     nodes, exact = edit.lattice_nodes, edit.exact_warp
