@@ -50,7 +50,7 @@ def publish(
     check_known(methods)
     entries = []
     for name in dict.fromkeys(case.scene for case in cases):
-        shutil.copytree(bench.photos(name).path, folder / "scenes" / name)
+        _copy(bench.photos(name).path, folder / "scenes" / name)
     for case in cases:
         entries.append(_write_case(folder, case, bench, methods))
         yield case
@@ -123,6 +123,13 @@ def _write_case(folder: Path, case: Case, bench: Workbench, methods: Sequence[st
         "height": cameras[0].height,
         "truths": truths,
     }
+
+
+def _copy(source: Path, target: Path) -> None:
+    """Copies a folder; ends at the first file that fails, where `shutil.copytree` would try them all."""
+    target.mkdir(parents=True)
+    for entry in sorted(source.iterdir()):
+        (_copy if entry.is_dir() else shutil.copyfile)(entry, target / entry.name)
 
 
 def _cameras(case: Case, scene: Scene, bench: Workbench) -> tuple[Camera, ...]:
