@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from collections.abc import Collection
 from pathlib import Path
 from typing import NoReturn
@@ -22,6 +23,10 @@ KILL_STEP = 12
 
 def cubed(number: int) -> int:
     return number**3
+
+
+def slept(seconds: float) -> None:
+    time.sleep(seconds)
 
 
 def killed_twice(folder: Path) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from cagefield.errors import line_of
 from cagefield.files import atomic
 from cagefield.files.atomic import recover_folder, replaced_folder
 from cagefield.files.rename_exchange import exchange_names
@@ -160,3 +162,23 @@ def test_saving_over_what_was_left_takes_no_scene_for_new(tmp_path: Path) -> Non
     with pytest.warns(UserWarning, match="it is back"), pytest.raises(ValueError, match="exists already"):
         ball_scene().with_edits(Scene.open(tmp_path / ".out.old-12345678").edits).save(tmp_path / "out")
     assert (tmp_path / "out" / "scene.json").is_file()
+
+
+def test_copies_that_do_not_fit_name_the_target_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk without links, full at the user's own files; no name of the hidden folder is told."""
+    target = tmp_path / "out"
+    (target / "mine").mkdir(parents=True)
+    for name in "abc":
+        (target / "mine" / name).write_text("mine")
+    tried: list[Path] = []
+
+    def full(one: Path, other: Path, **_: object) -> None:
+        tried.append(other)
+        raise OSError(errno.ENOSPC, "No space left on device", str(one), None, str(other))
+
+    monkeypatch.setattr(os, "link", full)
+    monkeypatch.setattr(atomic.shutil, "copy2", full)
+    with pytest.raises(OSError) as failed, replaced_folder(target, ()):
+        pass
+    assert line_of(failed.value) == f"{target}: No space left on device"
+    assert len(tried) == 2 and len(files_of(target)) == 3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ from benchmarks.edits.publication import OURS, UNEDITED
 from cagefield.cli import main
 from cagefield.edits import load_edits
 from cagefield.images.image_files import read_image
+from commands import refused
 
 pytestmark = pytest.mark.nightly
 
@@ -72,3 +74,27 @@ def test_the_folder_has_what_its_readme_says(folder: Path) -> None:
             assert len(list((place / name).iterdir())) == entry["views"]
             assert read_image(place / name / "000.png").shape[:2] == (entry["height"], entry["width"])
     assert (folder / "scenes" / "digger" / "transforms_train.json").is_file()
+
+
+def test_overwrite_replaces_what_a_call_wrote_and_keeps_the_rest(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Another edit, without peers, in place of two: nothing of the two is left."""
+    out = tmp_path / "again"
+    shutil.copytree(folder, out)
+    (out / "notes.txt").write_text("mine")
+    (out / "results" / "mine").mkdir()
+    words = ("bench", "publish", out, "--edits", "copy_cone", "--methods", *OPTIONS, "--overwrite")
+    assert "mine is not of this command; move it away" in refused(capsys, *words)
+    assert (out / "cases" / "digger-move_cone").is_dir()
+    (out / "results" / "mine").rmdir()
+    assert main([str(word) for word in words]) == 0
+    assert [entry.name for entry in (out / "cases").iterdir()] == ["digger-copy_cone"]
+    assert {entry.name for entry in (out / "results").iterdir()} == {OURS, UNEDITED}
+    assert (out / "notes.txt").read_text() == "mine"
+
+
+def test_a_folder_of_something_else_is_left(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    message = refused(capsys, "bench", "publish", tmp_path, *OPTIONS, "--overwrite")
+    assert "holds no cases.json and is left as it is" in message

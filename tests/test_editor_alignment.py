@@ -66,7 +66,9 @@ def test_up_by_points_a_paste_by_pairs_and_a_page(folder: Path, tmp_path: Path) 
         for count, point in enumerate(front[:2], start=1):
             click(editor, point)
             editor.until(f"cagefield.now.picked.points.length === {count}")
+        assert page.is_hidden(".hint")  # a double click would put a point
         editor.changed(lambda: click(editor, front[2]))
+        editor.said("up: normal of the three points, tilted by")
         up = np.array(editor.state["up"])
         assert np.linalg.norm(up) == pytest.approx(1.0)
         assert "Up: (" in page.inner_text(".up-direction")

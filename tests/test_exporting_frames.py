@@ -240,6 +240,16 @@ def test_refusals(
     assert files_of(tmp_path) == before
 
 
+def test_a_scene_without_a_camera_path_has_no_sequence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = saved(tmp_path, scene_with(MOVED))
+    (folder / "camera_path.json").unlink()
+    line = refused(capsys, "export", folder, "-o", tmp_path / "frames" / "%d.ply")
+    assert "has no camera path whose frames a sequence could be; give --camera-path" in line
+    assert not (tmp_path / "frames").exists()
+
+
 def test_an_edit_that_is_impossible_on_its_way() -> None:
     """At nine tenths of its way the inner cage has left the outer one."""
     cage = Cage.box((0, 0, 0), 0.4)

@@ -53,7 +53,7 @@ class BenchPublish:
     device: Device = "auto"
 
     overwrite: Flag = False
-    """Write into a folder that holds files."""
+    """Replace what an earlier call wrote there."""
 
     def run(self) -> None:
         """Trains what is missing, writes the folder, prints its table."""
@@ -61,13 +61,20 @@ class BenchPublish:
         from benchmarks.common.machine import Machine
         from benchmarks.common.workbench import Settings, Workbench
         from benchmarks.edits.methods import check_known
-        from benchmarks.edits.publication import publish
+        from benchmarks.edits.publication import CASES, ENTRIES, publish, results_of_others
         from cagefield.compute import devices
-        from cagefield.files.atomic import merged_folder
+        from cagefield.errors import CagefieldError
+        from cagefield.files.atomic import replaced_folder
+        from cagefield.files.safe_open import real_path
 
         cases = chosen(self.scenes, self.edits)
         check_known(self.methods)
-        check_folder(self.out, self.overwrite)
+        check_folder(self.out, self.overwrite, CASES)
+        if others := results_of_others(self.out):
+            raise CagefieldError(
+                f"{self.out / 'results' / others[0]} is not of this command; move it away, or give a new "
+                "folder"
+            )
         devices.start(self.device)
         settings = Settings(
             self.views,
@@ -79,7 +86,7 @@ class BenchPublish:
             discrete_views=self.discrete_views,
         )
         command = command_line("bench publish OUT", self)
-        with work_folder(self.workdir) as work, merged_folder(self.out) as folder:
+        with work_folder(self.workdir) as work, replaced_folder(real_path(self.out), ENTRIES) as folder:
             bench = Workbench(settings, work, progress_bar)
             machine = str(Machine.here())
             for case in publish(folder, cases, bench, self.methods, command, machine):

@@ -21,7 +21,7 @@ from benchmarks.common.figures import changed_pixels, floats
 from benchmarks.common.workbench import Workbench
 from benchmarks.edits.compare_shells import FINER, seen
 from benchmarks.edits.methods import METHODS, Method, check_known
-from benchmarks.edits.naive_splats import seen_naively
+from benchmarks.edits.naive_splats import NAIVE, seen_naively
 from cagefield.cameras.camera import Camera
 from cagefield.fields.splat_field import SplatField
 from cagefield.images.image_files import write_png
@@ -31,6 +31,9 @@ from cagefield.typing import AnyArray
 SOURCES = Path(__file__).parent / "published"
 SCRIPT, README = "evaluate.py", "README.md"
 OURS, UNEDITED = "cagefield", "unedited"
+CASES = "cases.json"
+ENTRIES = ("scenes", "cases", "results", CASES, "table.json", "table.md", SCRIPT, README)
+"""Names of the entries of a published folder."""
 
 
 def publish(
@@ -47,11 +50,11 @@ def publish(
     check_known(methods)
     entries = []
     for name in dict.fromkeys(case.scene for case in cases):
-        shutil.copytree(bench.photos(name).path, folder / "scenes" / name)
+        _copy(bench.photos(name).path, folder / "scenes" / name)
     for case in cases:
         entries.append(_write_case(folder, case, bench, methods))
         yield case
-    _write_json(folder / "cases.json", {"version": 1, "cases": entries})
+    _write_json(folder / CASES, {"version": 1, "cases": entries})
     shutil.copyfile(SOURCES / SCRIPT, folder / SCRIPT)
     text = (SOURCES / README).read_text(encoding="utf-8")
     for word, value in (("COMMAND", command), ("MACHINE", machine)):
@@ -61,6 +64,13 @@ def publish(
     rows = script.table(root=folder)
     _write_json(folder / "table.json", rows)
     (folder / "table.md").write_text(script.markdown(rows), encoding="utf-8")
+
+
+def results_of_others(folder: Path) -> list[str]:
+    """Names of methods whose pictures lie in a published folder's results and are not of `publish`."""
+    ours = {OURS, UNEDITED, *METHODS, *(f"naive, {way}" for way in NAIVE)}
+    results = folder / "results"
+    return sorted({entry.name for entry in results.iterdir()} - ours) if results.is_dir() else []
 
 
 def load_script(path: Path) -> ModuleType:
@@ -113,6 +123,13 @@ def _write_case(folder: Path, case: Case, bench: Workbench, methods: Sequence[st
         "height": cameras[0].height,
         "truths": truths,
     }
+
+
+def _copy(source: Path, target: Path) -> None:
+    """Copies a folder; ends at the first file that fails, where `shutil.copytree` would try them all."""
+    target.mkdir(parents=True)
+    for entry in sorted(source.iterdir()):
+        (_copy if entry.is_dir() else shutil.copyfile)(entry, target / entry.name)
 
 
 def _cameras(case: Case, scene: Scene, bench: Workbench) -> tuple[Camera, ...]:

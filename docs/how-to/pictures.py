@@ -5,6 +5,9 @@
     python docs/how-to/pictures.py measure SCENE       # two points measured in the editor
     python docs/how-to/pictures.py decimated SCENE     # all splats, a quarter and a sixteenth
     python docs/how-to/pictures.py aligned SCENE       # a paste before and after its alignment
+    python docs/how-to/pictures.py pairs SCENE         # pairs of points picked in the editor
+    python docs/how-to/pictures.py up SCENE            # up by three points in the editor, before and after
+    python docs/how-to/pictures.py published FOLDER    # of `cagefield bench publish`, its pictures
 
 SCENE is `biker.compressed.ply` of PlayCanvas' examples, imported; it is copied first and left as it is.
 """
@@ -39,16 +42,21 @@ from cagefield.geometry.point_alignment import Similarity
 from cagefield.images.metrics import psnr
 from cagefield.pages.scene_page import ScenePage
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
+from cagefield.scene.alignment import Alignment
 from cagefield.scene.hotspots import view_of_camera
 from cagefield.scene.paste_alignment import align_paste, placed
 from chromium import chromium_context
 from editor_page import EditorPage, editor_page
 from editor_server import editor_server
+from splat_rooms import room
 
 HERE = Path(__file__).parent
 HELMET = load_edits(HERE.parent / "edits" / "biker_larger_helmet.yaml")
 HELMET_PIXEL, KNEE_PIXEL = (150, 262), (190, 488)
 """Pixels of the camera of `hotspots`."""
+PAIR_PIXELS = ((400, 146), (283, 205), (331, 216))
+"""Belt, hand and letters, in the camera of `_hips`."""
+FLOOR_POINTS = ((-0.7, -0.7, 0.0), (0.7, -0.7, 0.0), (-0.5, 0.6, 0.0))
 PAGE_SPLATS = 50_000
 """Splats of the scene in the browser, which draws in software."""
 
@@ -56,7 +64,9 @@ PAGE_SPLATS = 50_000
 def main() -> None:
     """Runs a session."""
     name, path = sys.argv[1:]
-    sessions = (hotspots, frames, measure, decimated, aligned)
+    if name == "published":
+        return published(Path(path))
+    sessions = (hotspots, frames, measure, decimated, aligned, pairs, up)
     session = {one.__name__: one for one in sessions}[name]
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / "biker"
@@ -179,6 +189,92 @@ def aligned(scene: Scene, folder: Path) -> None:
     beside(pictures).save(HERE / "aligned.jpg", quality=85)
 
 
+def pairs(scene: Scene, folder: Path) -> None:
+    """A paste in other units beside its place, three pairs and the dialog, and the paste on its place."""
+    field = scene.field
+    assert isinstance(field, SplatField)
+    is_person = field.scales.max(axis=1) < 0.1
+    lower = field.take(np.flatnonzero(is_person & (field.means[:, 1] > -2.1)))  # the file's y points down
+    upper = field.take(np.flatnonzero(is_person & (field.means[:, 1] < -1.2)))
+    darker = np.broadcast_to(Grade(exposure=-0.9, temperature=-0.4).matrix, (len(upper), 3, 3))
+    upper = dataclasses.replace(upper, sh=grade_sh(upper.sh, darker), bounds=None)
+    away, right = _directions(scene)
+    side = Camera.look_at(*_hips(scene, away), width=760, height=560, fov_x=0.85)
+    goals = [np.array(surface(scene, side, pixel)) for pixel in PAIR_PIXELS]
+    target = np.array([0.0, -1.7, 0.1]) + 0.5 * right
+    camera = Camera.look_at(target + 5.4 * away, target, scene.up, width=760, height=560, fov_x=0.85)
+    dataclasses.replace(scene, field=upper, cameras={}).save(folder / "other")
+    dataclasses.replace(scene, field=lower, cameras={"test": (camera,)}).save(folder / "lower")
+    turn = Rotation.from_rotvec(0.25 * scene.up).as_matrix()
+    middle, _ = _center_and_size(upper.means)
+    moved = Similarity(0.8, turn, middle + 1.2 * right + 0.2 * scene.up - 0.8 * turn @ middle)
+    opened = Scene.open(folder / "lower")
+    paste = placed(opened.paste("../other", name="upper"), moved)
+    opened.with_edits(EditStack([paste])).save(folder / "lower", overwrite=True)
+    picked = [point for goal in goals for point in (moved.transform_points(goal[None])[0], goal)]
+    with editor_server(folder / "lower") as server, editor_page(server.link, 1100, 680) as editor:
+        editor.ready()
+        editor.press("Shift+A")
+        for count, point in enumerate(picked, start=1):
+            click(editor, point)
+            editor.until(f"cagefield.now.picked.points.length === {count}")
+            if count == 5:
+                screen(editor, "pairs")
+        editor.changed(lambda: editor.page.click("dialog[open] button.primary"))
+        screen(editor, "pairs-aligned")
+
+
+def up(scene: Scene, folder: Path) -> None:
+    """A tilted room, two of three points of its floor, and the view about the normal of the three."""
+    tilted = np.array([0.3, 0.1, 1.0])
+    tilted /= np.linalg.norm(tilted)
+    camera = Camera.look_at((-1.1, -3.2, 1.6), (0.0, 0.0, 0.1), tilted, width=560, height=520, fov_x=0.75)
+    whole_room = dataclasses.replace(scene, field=room(True), cameras={"test": (camera,)}, folder=None)
+    dataclasses.replace(whole_room, alignment=Alignment(up=tuple(tilted.tolist()))).save(folder / "room")
+    views = []
+    with editor_server(folder / "room") as server, editor_page(server.link, 900, 600) as editor:
+        editor.ready()
+        editor.press("Shift+Y")
+        for count, point in enumerate(FLOOR_POINTS[:2], start=1):
+            click(editor, np.array(point))
+            editor.until(f"cagefield.now.picked.points.length === {count}")
+        views.append(window(editor))
+        editor.changed(lambda: click(editor, np.array(FLOOR_POINTS[2])))
+        views.append(window(editor))
+    beside(views).save(HERE / "up.jpg", quality=80)
+
+
+def published(folder: Path) -> None:
+    """Before, truth and result of a continuous edit, truth and result of a move."""
+    raised, moved = (folder / "cases" / name for name in ("digger-raise_arm", "digger-move_cone"))
+    results = folder / "results" / "cagefield"
+    places = (
+        *(raised / "before", raised / "truth", results / raised.name),
+        *(moved / "truth", results / moved.name),
+    )
+    pictures = [Image.open(place / "000.png").convert("RGB") for place in places]
+    beside(pictures).save(HERE / "edit-benchmark.jpg", quality=85)
+
+
+def _directions(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Level unit vectors [3] towards the scene's camera, and to the right of its picture."""
+    away = scene.first_camera.origin * (1, 0, 1)
+    away = away / np.linalg.norm(away)
+    return away, np.cross(scene.up, away)
+
+
+def _hips(scene: Scene, away: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Eye, target and up of a camera at the height of the hips."""
+    target = np.array([0.1, -1.25, 0.1])
+    return target + 3.4 * away + 0.4 * scene.up, target, scene.up
+
+
+def click(editor: EditorPage, point: np.ndarray) -> None:
+    """A click on a world point [3]."""
+    at = editor.page.evaluate(f"cagefield.project({point.tolist()})")
+    editor.page.mouse.click(at["x"], at["y"])
+
+
 def _center_and_size(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Center [3] and size [3] of the box of points [N,3], without the outermost of them."""
     low, high = np.quantile(points, [0.002, 0.998], axis=0)
@@ -245,9 +341,14 @@ def beside(pictures: list[Image.Image]) -> Image.Image:
 
 def screen(editor: EditorPage, name: str) -> None:
     """A picture of the window."""
+    window(editor).save(HERE / f"{name}.jpg", quality=80)
+
+
+def window(editor: EditorPage) -> Image.Image:
+    """The window once its picture is complete."""
     editor.settle()
     editor.page.wait_for_timeout(400)
-    editor.page.screenshot(path=HERE / f"{name}.jpg", type="jpeg", quality=80)
+    return Image.open(io.BytesIO(editor.page.screenshot())).convert("RGB")
 
 
 if __name__ == "__main__":

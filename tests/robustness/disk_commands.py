@@ -14,6 +14,7 @@ from cagefield.cameras.keyframe_files import dump_path
 from cagefield.cameras.keyframes import Keyframe
 from cagefield.formats.splats.splat_files import write_splats
 from cagefield.procedural import make_scene
+from plenoctree_files import plenoctree_arrays, write_plenoctree
 from posed_photos import photos_alone
 from scenes import ball_scene
 from splat_scenes import ball_of_splats
@@ -42,6 +43,7 @@ def sources(folder: Path) -> None:
     write_street(folder / "street", photos=12, size=96, length=5.0)
     if importlib.util.find_spec("torch") is not None:
         write_checkpoints(folder, splats=4000)
+    write_plenoctree(folder / "a.npz", plenoctree_arrays())
     (folder / "e.yaml").write_text(EDITS)
     (folder / "grade.yaml").write_text(EDITS.replace("operations", "grade: {hue_deg: 40}\n    operations"))
 
@@ -84,6 +86,10 @@ _EDITS = (
     "bench edits -o {out} --scenes chair --edits lean_back --views 3 --size 16 --test-views 1 "
     "--steps 3 --resolution 16 --exact-size 16 --exact-views 1"
 )
+_PUBLISH = (
+    "bench publish {out} --edits lean_back --methods trilinear --views 3 --size 16 --test-views 1 "
+    "--steps 3 --resolution 16 --exact-size 16 --exact-views 1"
+)
 _CAPTURES = "bench captures room-chair -o {out} --room-views 8 --room-size 48 --steps 2 --splats 100"
 _TRAINING = "bench training {s}/photos -o {out} --steps 3 --resolution 16"
 
@@ -110,6 +116,7 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
     "import": DiskCommand("import {s}/x.ply -o {out}", "new"),
     "import .tar": DiskCommand(f"import {{s}}/a.tar -o {{out}} {_BAKING}", "new"),
     "import .ckpt, nerf": DiskCommand(f"import {{s}}/a.ckpt -o {{out}} {_BAKING}", "new"),
+    "import .npz": DiskCommand(f"import {{s}}/a.npz -o {{out}} {_BAKING}", "new"),
     "import .ckpt, splats": DiskCommand("import {s}/s.ckpt -o {out}", "new"),
     "bake": DiskCommand("bake {s}/splats -o {out} --resolution 24 --compare 0", "new"),
     **{f"export {end}": DiskCommand("export {s}/splats -o {out}", f"x{end}") for end in _SPLAT_ENDINGS},
@@ -146,6 +153,8 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
     "bench edits, its work": DiskCommand(
         f"{_EDITS} --no-methods --workdir {{work}}", "edits.md", work="work"
     ),
+    "bench publish": DiskCommand(_PUBLISH, "published"),
+    "bench publish, its work": DiskCommand(f"{_PUBLISH} --workdir {{work}}", "published", work="work"),
     "bench captures": DiskCommand(_CAPTURES, "captures.md"),
     "bench captures, its work": DiskCommand(f"{_CAPTURES} --workdir {{work}}", "captures.md", work="work"),
     "bench training": DiskCommand(_TRAINING, "curve.csv"),

@@ -43,21 +43,19 @@ def _svraster(quantized: bool) -> Callable[[Path], None]:
     return make
 
 
-def _make_svraster_field(folder: Path) -> None:
-    from cagefield.fields.external.external_file import save_external
-    from cagefield.formats.external.svraster import read_svraster
+def _kept(name: str, make: Callable[[Path], None]) -> Callable[[Path], None]:
+    """The field of a checkpoint as a scene keeps it; the checkpoint goes."""
 
-    save_external(read_svraster(svraster_content(outside=0)).field, folder / "a.safetensors")  # type: ignore[arg-type]
+    def keep(folder: Path) -> None:
+        from cagefield.fields.external.external_file import save_external
+        from cagefield.formats.external.read_external import read_external
 
+        make(folder)
+        found = read_external(folder / name)
+        (folder / name).unlink()
+        save_external(found.field, folder / "a.safetensors")  # type: ignore[union-attr, arg-type]
 
-def _make_field(folder: Path) -> None:
-    from cagefield.fields.external.external_file import save_external
-    from cagefield.formats.external.read_external import read_external
-
-    write_tensorf(folder / "b.th", tensorf_content())
-    found = read_external(folder / "b.th")
-    (folder / "b.th").unlink()
-    save_external(found.field, folder / "a.safetensors")  # type: ignore[union-attr, arg-type]
+    return keep
 
 
 def _read_field(folder: Path) -> None:
@@ -77,23 +75,31 @@ def _plenoctree(folder: Path) -> None:
     write_plenoctree(folder / "a.npz", plenoctree_arrays())
 
 
+def _original(name: str, make: Callable[[Path], None]) -> Reader:
+    return Reader(_kept(name, make), _read_field, {"a.safetensors": "safetensors"})
+
+
 _BACKGROUND = {"background_data": np.zeros((8, 4, 4), np.float32), "background_links": np.zeros((4, 2), int)}
 
 EXTERNAL_READERS: dict[str, Reader] = {
     "TensoRF .th": Reader(_tensorf("TensorVMSplit", "MLP_Fea"), _read("a.th"), {"a.th": "zip"}),
+    "TensoRF .th, VM": Reader(_tensorf("TensorVM", "RGB"), _read("a.th"), {"a.th": "zip"}),
     "TensoRF .th, lines": Reader(_tensorf("TensorCP", "SH"), _read("a.th"), {"a.th": "zip"}),
-    "original, TensoRF": Reader(_make_field, _read_field, {"a.safetensors": "safetensors"}),
+    "original, TensoRF": _original("a.th", _tensorf("TensorVMSplit", "MLP_Fea")),
     "PlenOctree .npz": Reader(_plenoctree, _read("a.npz"), {"a.npz": "zip"}),
+    "original, PlenOctree": _original("a.npz", _plenoctree),
     "SVRaster .pt": Reader(_svraster(False), _read("a.pt"), {"a.pt": "zip"}),
     "SVRaster .pt, quantized": Reader(_svraster(True), _read("a.pt"), {"a.pt": "zip"}),
-    "original, SVRaster": Reader(_make_svraster_field, _read_field, {"a.safetensors": "safetensors"}),
+    "original, SVRaster": _original("a.pt", _svraster(False)),
     "svox2 .npz": Reader(_svox2(False), _read("a.npz"), {"a.npz": "zip"}),
     "svox2 .npz, deflated": Reader(_svox2(True, **_BACKGROUND), _read("a.npz"), {"a.npz": "zip"}),
 }
 EXTERNAL_NEED_TORCH = (
     "TensoRF .th",
+    "TensoRF .th, VM",
     "TensoRF .th, lines",
     "original, TensoRF",
     "SVRaster .pt",
     "SVRaster .pt, quantized",
+    "original, SVRaster",
 )

@@ -52,6 +52,17 @@ def _make_field(folder: Path) -> None:
     save_external(found, folder / "a.safetensors")  # type: ignore[arg-type]
 
 
+def _make_nerfacto_field(folder: Path) -> None:
+    from cagefield.fields.external.external_file import save_external
+    from cagefield.formats.external.read_external import read_external
+
+    _nerfacto("torch")(folder)
+    found = read_external(folder / "a.ckpt")
+    save_external(found.field, folder / "a.safetensors")  # type: ignore[union-attr, arg-type]
+    for name in ("a.ckpt", "config.yml", "dataparser_transforms.json"):
+        (folder / name).unlink()
+
+
 def _read_field(folder: Path) -> None:
     from cagefield.scene.scene_files import read_original
 
@@ -62,6 +73,7 @@ HASH_GRID_READERS: dict[str, Reader] = {
     "nerfacto .ckpt": Reader(_nerfacto("torch"), _read("a.ckpt"), {"a.ckpt": "zip"}),
     "nerfacto .ckpt, tcnn": Reader(_nerfacto("tcnn"), _read("a.ckpt"), {"a.ckpt": "zip"}),
     "nerfacto config.yml": Reader(_nerfacto("torch"), _read("a.ckpt"), {"config.yml": "yaml"}),
+    "original, nerfacto": Reader(_make_nerfacto_field, _read_field, {"a.safetensors": "safetensors"}),
     "nerfacto transforms": Reader(
         _nerfacto("torch"), _read("a.ckpt"), {"dataparser_transforms.json": "json"}
     ),
@@ -69,4 +81,4 @@ HASH_GRID_READERS: dict[str, Reader] = {
     "Instant-NGP .ingp": Reader(_snapshot("a.ingp"), _read("a.ingp"), {"a.ingp": "bytes"}),
     "original, Instant-NGP": Reader(_make_field, _read_field, {"a.safetensors": "safetensors"}),
 }
-HASH_GRID_NEED_TORCH = tuple(name for name in HASH_GRID_READERS if name.startswith("nerfacto"))
+HASH_GRID_NEED_TORCH = tuple(name for name in HASH_GRID_READERS if "nerfacto" in name)

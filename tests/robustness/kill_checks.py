@@ -170,6 +170,22 @@ def page_folder_problem(name: str) -> Check:
     return _read_with(name, read)
 
 
+def published_problem(name: str) -> Check:
+    """A published benchmark: the table of its pictures, by its own script."""
+
+    def read(folder: Path) -> None:
+        from benchmarks.edits.publication import load_script
+
+        script = load_script(folder / "evaluate.py")
+        rows = script.table(root=folder)
+        if rows != json.loads((folder / "table.json").read_text()):
+            raise ValueError("the table is of other pictures")
+        if script.markdown(rows) != (folder / "table.md").read_text():
+            raise ValueError("the table is cut off")
+
+    return _read_with(name, read)
+
+
 def photos_problem(name: str) -> Check:
     def problem(folder: Path, said: int) -> str | None:
         from cagefield import datasets

@@ -20,6 +20,7 @@ from kill_checks import (
     photos_problem,
     picture_problem,
     ply_problem,
+    published_problem,
     scene_problem,
     table_problem,
     trained_problem,
@@ -30,6 +31,7 @@ from torch_files import write_checkpoints
 
 from cagefield import Scene
 from cagefield.formats.splats.splat_files import write_splats
+from plenoctree_files import plenoctree_arrays, write_plenoctree
 from splat_scenes import ball_of_splats
 
 
@@ -78,6 +80,10 @@ _OLD_LINES = {
     "captures.md": (
         "bench captures room-chair -o {}/captures.md --room-views 8 --room-size 48 --steps 2 --splats 100 "
         "--workdir {}/work"
+    ),
+    "published": (
+        "bench publish {}/published --edits lean_back --methods trilinear --views 3 --size 16 --test-views 1 "
+        "--steps 3 --resolution 16 --exact-size 16 --exact-views 1 --workdir {}/work"
     ),
     "one.png": "render {}/scene -o {}/one.png --views 0 --size 24",
     "out": "export {}/scene -o {}/out --as page --embed",
@@ -134,6 +140,11 @@ def _checkpoints() -> tempfile.TemporaryDirectory[str]:
 def _imported(name: str, options: str = "") -> Command:
     words = f"import {{}}/{name} -o {{}}/scene {options}"
     return _line(words, _torch_file(name), lambda folder, said: scene_problem(folder, 0))
+
+
+def _put_plenoctree(folder: Path) -> None:
+    put_scene(folder)
+    write_plenoctree(folder / "a.npz", plenoctree_arrays())
 
 
 def _trained(field: str) -> Command:
@@ -221,6 +232,7 @@ def _curve_problem(folder: Path, said: int) -> str | None:
 
 _pages = _over_old_folder("out", page_folder_problem("out"))
 _photos = _over_old_folder("made", photos_problem("made"))
+_published = _over_old_folder("published", published_problem("published"))
 _demo = _over_old_folder("demo", demo_problem)
 
 LINES: dict[str, Command] = {
@@ -238,6 +250,11 @@ SLOW_LINES: dict[str, Command] = {
     "train, blocks": Command(_put_street, _train_blocks, trained_problem),
     "import .tar": _imported("a.tar", _BAKING),
     "import .ckpt, nerf": _imported("a.ckpt", _BAKING),
+    "import .npz": _line(
+        f"import {{}}/a.npz -o {{}}/scene {_BAKING}",
+        _put_plenoctree,
+        lambda folder, said: scene_problem(folder, 0),
+    ),
     "import .ckpt, splats": _imported("s.ckpt"),
     "export, a mesh .ply": _over_old_file("mesh.ply", ply_problem("mesh.ply")),
     "export, a mesh .glb": _over_old_file("mesh.glb", glb_problem("mesh.glb")),
@@ -249,6 +266,8 @@ SLOW_LINES: dict[str, Command] = {
     "make-scene, a room": _over_old_folder("room", photos_problem("room")),
     "render .png": _over_old_file("one.png", picture_problem("one.png")),
     "bench edits": _over_old_file("edits.md", table_problem("edits.md")),
+    "bench publish": _published,
+    "bench publish, renames": renamed(_published, "published"),
     "bench captures": _over_old_file("captures.md", table_problem("captures.md")),
     "bench training": _line(_OLD_LINES["curve.csv"], _make_curve, old_problem("curve.csv", _curve_problem)),
     "bench speed": _over_old_file("speed.json", json_problem("speed.json")),

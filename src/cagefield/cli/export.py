@@ -158,7 +158,13 @@ class Export:
                 "--source-coordinates and --add"
             )
         check_writable(frame_file(self.out, 0))
-        path = CameraPath.load(self.camera_path or self.scene / "camera_path.json", self.fps)
+        own = self.scene / "camera_path.json"
+        if self.camera_path is None and self.scene.is_dir() and not own.exists():
+            raise CagefieldError(
+                f"{self.scene} has no camera path whose frames a sequence could be; give --camera-path, or "
+                "make one in the editor"
+            )
+        path = CameraPath.load(self.camera_path or own, self.fps)
         scene = self._opened(self.scene)
         devices.start(self.device)
         with progress_bar("Frames") as move:

@@ -47,8 +47,8 @@ def train_in_blocks(
 
     with stages() as move:
         blocks, jobs = plan_blocks(dataset, config, count, folder, move)
-    for block, job in zip(blocks, jobs, strict=True):
-        print(f"{job.name} of {count}: {block.describe()}", file=sys.stderr)
+    for number, block in enumerate(blocks, start=1):
+        print(f"block {number} of {count}: {block.describe()}", file=sys.stderr)
     if names := left_out(dataset, blocks):
         shown = f"{len(names)} of {len(dataset.train)} photos are in no block: {join_names(names)}"
         print(shown, file=sys.stderr)

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
+from cagefield.cluster.patience import Patience
 from cagefield.errors import CagefieldError
 from cagefield.files.temporary_folders import TemporaryFolder
 
@@ -27,9 +28,10 @@ if TYPE_CHECKING:
 LOCAL_WORKERS_HOST = "127.0.0.1"
 MAX_LOCAL_WORKERS = 256
 CONNECT_SECONDS = 30.0
-"""Time that a scheduler elsewhere and its first worker are waited for."""
+"""Time that a scheduler elsewhere is waited for."""
 LOCAL_CONNECT_SECONDS = 600.0
-"""Time for local workers, on a machine that may be busy."""
+"""Time for the scheduler of local workers, on a machine that may be busy."""
+CLOSE_SECONDS = 10.0
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,8 @@ def check_installed() -> None:
 def connect(cluster: int | str, tls: TlsFiles | None = None) -> Iterator[Client]:
     """Client of a cluster with at least one worker; local workers end with the context.
 
-    Raises CagefieldError without the package, without a reply, and for `tls://` without certificates.
+    Raises CagefieldError without the package, without a reply, and for `tls://` without certificates,
+    LostClusterError for a cluster without workers (`patience`).
     """
     check_installed()
     if isinstance(cluster, str) and cluster.startswith("tls://") and tls is None:
@@ -108,6 +111,7 @@ def connect(cluster: int | str, tls: TlsFiles | None = None) -> Iterator[Client]
             )
     security = tls.security() if tls is not None else None
     with ExitStack() as opened:
+        opened.enter_context(_quiet_dask())
         if isinstance(cluster, int):
             target: Any = opened.enter_context(_local_workers(cluster, security))
         else:
@@ -118,6 +122,15 @@ def connect(cluster: int | str, tls: TlsFiles | None = None) -> Iterator[Client]
 
             client.register_plugin(InterruptPlugin())
         yield client
+
+
+@contextmanager
+def _quiet_dask() -> Iterator[None]:
+    """Context without dask's own log on stderr: errors have a line of this package."""
+    from distributed.utils import silence_logging_cmgr
+
+    with silence_logging_cmgr(logging.CRITICAL):
+        yield
 
 
 @contextmanager
@@ -174,12 +187,12 @@ def _client(cluster: int | str, local: Any, security: Security | None) -> Iterat
     except (OSError, TypeError) as error:
         reason = " ".join(str(error).split())[:200]
         raise CagefieldError(f"no scheduler replies at {cluster} ({reason}); check address and TLS") from None
-    with client:
-        try:
-            client.wait_for_workers(1, timeout=seconds)
-        except TimeoutError:
-            raise CagefieldError(f"cluster {cluster} has no workers; start some with `dask worker`") from None
+    try:
+        Patience(client).wait_for_worker()
         yield client
+    finally:
+        with suppress(TimeoutError, asyncio.TimeoutError, OSError):  # of a scheduler that is gone
+            client.close(CLOSE_SECONDS)
 
 
 def _is_loopback(host: str) -> bool:

@@ -7,14 +7,15 @@ command. Workers hold no state that a frame depends on, so pictures are those of
 
 from __future__ import annotations
 
+import asyncio
 import uuid
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import cagefield
-from cagefield.cluster.connection import TlsFiles, connect
+from cagefield.cluster.connection import CLOSE_SECONDS, TlsFiles, connect
 from cagefield.cluster.frame_tasks import FrameJob, FrameResult, fit_depth_scale, render_frame, write_contents
 from cagefield.cluster.scene_archive import SceneArchive, SceneSource
 from cagefield.cluster.tasks import RETRIES, results_of, warned_losses
@@ -102,9 +103,16 @@ def open_frame_cluster(
 
             archive = SceneArchive.packed(source, scene)
             client.register_plugin(ArchivePlugin(archive), name=archive.name)
-            opened.callback(client.unregister_worker_plugin, archive.name)
+            opened.callback(_forget, client, archive.name)
         opened.enter_context(warned_losses(client, "rendered their frames"))
         yield FrameCluster(client, job)
+
+
+def _forget(client: Client, name: str) -> None:
+    """Takes an archive from the workers that can still be reached."""
+    if client.status == "running":
+        with suppress(TimeoutError, asyncio.TimeoutError, OSError):
+            client.sync(client.scheduler.unregister_worker_plugin, name=name, callback_timeout=CLOSE_SECONDS)
 
 
 def _all_see(client: Client, source: SceneSource) -> bool:

@@ -5,13 +5,16 @@ A task of a lost worker is given to another one; so a task writes its files whol
 
 from __future__ import annotations
 
+import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from cagefield.cluster.connection import TlsFiles, connect
+from cagefield.cluster.patience import POLL_SECONDS, LostClusterError, Patience, lost_connection
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
@@ -66,19 +69,26 @@ def results_of(
     """Name and result of each future, in the order in which they are complete; `futures` is emptied.
 
     Unfinished tasks are cancelled when the iteration ends early. Messages begin with `kind` and the
-    name. Raises CagefieldError for lost workers, unless `failures` takes the message, and for a lost
-    connection.
+    name. Raises CagefieldError for lost workers, unless `failures` takes the message, LostClusterError for a
+    lost connection and for a cluster that has had no workers for a time (`patience`).
     """
     from distributed import CancelledError, KilledWorker, as_completed
 
+    patience = Patience(client)
     names = {future.key: name for future, name in futures.items()}
     waiting = set(futures)
     futures.clear()  # a result is released once it is here
     try:
-        for future in as_completed(list(waiting), loop=client.loop):
+        completed = as_completed(list(waiting), loop=client.loop)
+        while not completed.is_empty():
+            if not completed.has_ready():
+                patience.check()
+                time.sleep(POLL_SECONDS)
+                continue
+            future = next(completed)
             name = names[future.key]
             try:
-                result = future.result()
+                result = _result_of(future, patience)
             except KilledWorker as error:
                 message = (
                     f"{int(getattr(error, 'allowed_failures', 3)) + 1} workers ended while they worked on "
@@ -90,14 +100,31 @@ def results_of(
                 waiting.discard(future)
                 continue
             except CancelledError:
-                raise CagefieldError(
-                    "the connection to the cluster is lost; go on with --keep or --resume"
-                ) from None
+                raise lost_connection() from None
             waiting.discard(future)
             yield name, result
     finally:
-        if waiting:
+        if waiting and client.status == "running":
             client.cancel(list(waiting), force=True)
+
+
+def _result_of(future: Future, patience: Patience) -> Any:
+    """Result of a completed future, which dask computes again where its worker is gone with it.
+
+    Raises what the task has raised, CancelledError, and LostClusterError for a lost connection.
+    """
+    pool = ThreadPoolExecutor(1)
+    try:
+        result = pool.submit(future.result)
+        while wait([result], POLL_SECONDS).not_done:
+            patience.check()
+        return result.result()
+    except OSError:
+        if future.status == "error":
+            raise
+        raise lost_connection() from None
+    finally:
+        pool.shutdown(wait=False)
 
 
 @contextmanager
@@ -113,11 +140,15 @@ def warned_losses(client: Client, others: str) -> Iterator[None]:
     client.subscribe_topic("all", noted)
     try:
         yield
+    except LostClusterError:
+        others = ""
+        raise
     finally:
-        client.unsubscribe_topic("all")
+        if client.status == "running":
+            client.unsubscribe_topic("all")
         if lost:
-            text = "1 worker was" if len(lost) == 1 else f"{len(lost)} workers were"
-            warnings.warn(f"{text} lost; others {others}", stacklevel=2)
+            text = "1 worker was lost" if len(lost) == 1 else f"{len(lost)} workers were lost"
+            warnings.warn(f"{text}; others {others}" if others else text, stacklevel=2)
 
 
 def _outcome(device: str, task: Task) -> tuple[Any, str]:

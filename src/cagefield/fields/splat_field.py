@@ -60,8 +60,7 @@ class SplatField:
         bounds: [2,3] float64 box of interest; None takes the box of the central 98 % of the means.
         unbounded: True where splats beyond `bounds` are the background.
         offset: coordinates of the source file less those of the field, for coordinates beyond the precision
-        of
-            float32. Exports add the offset.
+            of float32. Exports add the offset.
 
     Raises:
         FieldError: mismatching shapes, NaN or infinity, opacities outside [0, 1].

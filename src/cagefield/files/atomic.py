@@ -68,8 +68,10 @@ def _naming(path: Path, hidden: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        name = error.filename
-        if name is None or (isinstance(name, (str, Path)) and Path(name).is_relative_to(hidden)):
+        names = (error.filename, error.filename2)  # two where a copy failed
+        if names[0] is None or any(
+            isinstance(name, (str, Path)) and Path(name).is_relative_to(hidden) for name in names
+        ):
             error.filename, error.filename2 = str(path), None
             if error.errno is None:  # pillow's, which has words alone
                 error.errno, error.strerror = errno.EIO, str(error.args[0]) if error.args else "failed"
@@ -174,16 +176,17 @@ def _others(folder: Path, own: Collection[str]) -> list[Path]:
 
 
 def _linked(entry: Path, copy: Path) -> None:
-    """Another name of a file, or a folder with other names of its files; a copy where there are no links."""
+    """Another name of a file, or a folder with other names of its files; a copy where there are no links.
 
-    def link(source: str, destination: str) -> str:
-        try:
-            os.link(source, destination, follow_symlinks=False)
-        except OSError:
-            shutil.copy2(source, destination, follow_symlinks=False)
-        return destination
-
+    Raises the first OSError, where `shutil.copytree` would try the other files and tell of all.
+    """
     if entry.is_dir() and not entry.is_symlink():
-        shutil.copytree(entry, copy, symlinks=True, copy_function=link)
-    else:
-        link(str(entry), str(copy))
+        copy.mkdir()
+        for part in entry.iterdir():
+            _linked(part, copy / part.name)
+        shutil.copystat(entry, copy)
+        return
+    try:
+        os.link(entry, copy, follow_symlinks=False)
+    except OSError:
+        shutil.copy2(entry, copy, follow_symlinks=False)

@@ -12,6 +12,12 @@ const PAIRS = 3;
 /** Number of points of a tool. */
 export const POINT_COUNT: Record<PickedPoints["purpose"], number> = { up: PLANE_POINTS, paste: 2 * PAIRS };
 
+/** Words for the last point. */
+const WHOLE_TEXT: Record<PickedPoints["purpose"], string> = {
+  up: "three points are there: up is the normal of their plane",
+  paste: `${PAIRS} pairs are there`,
+};
+
 /** Receivers of the collected points. */
 export interface PickerActions {
   /** Three points of a level plane. */
@@ -48,8 +54,9 @@ export class PointPicker {
     const points = picked.points.length === POINT_COUNT[purpose] ? [point] : [...picked.points, point];
     const isWhole = points.length === POINT_COUNT[purpose];
     store.set({ picked: isWhole && purpose === "up" ? null : { purpose, points } });
-    if (!isWhole) this.host.say(nextPointText({ purpose, points }), "info");
-    else if (purpose === "up") this.actions.plane(points);
+    this.host.say(isWhole ? WHOLE_TEXT[purpose] : nextPointText({ purpose, points }), "info");
+    if (!isWhole) return;
+    if (purpose === "up") this.actions.plane(points);
     else this.actions.pairs(pairsOf(points));
   }
 

@@ -6,7 +6,7 @@ import type { App } from "../app/app";
 import { describeOperation } from "../editing/operations";
 import type { Pointer } from "../editing/pointer";
 import { h } from "./dom";
-import { isReadOnly } from "../app/store";
+import { hasPointTool, isReadOnly } from "../app/store";
 
 const TOAST_STAYS = 7000;
 
@@ -116,8 +116,9 @@ function hint(app: App): HTMLElement {
     { class: "hint" },
     "Double-click the picture to put a pair of cages around what is there",
   );
-  app.store.watch(["state", "hello"], (now) => {
-    line.hidden = isReadOnly(now) || now.state === null || now.state.edits.length > 0;
+  app.store.watch(["state", "hello", "measured", "placesHotspot", "picked"], (now) => {
+    const hasEdits = now.state === null || now.state.edits.length > 0;
+    line.hidden = isReadOnly(now) || hasEdits || hasPointTool(now);
   });
   return line;
 }

@@ -106,7 +106,7 @@ class PoseError:
         size: longer side of the compared photos, in pixels.
         worst: name and error of the worst photo.
         capped: mean of the pairs' errors, each capped at MAX_PAIR_PIXELS; the measure by which corrections
-        are compared.
+            are compared.
         contradicted: share of the pairs above CONTRADICTED_PIXELS.
         focal_spread: largest spread of focal lengths among photos of one size that have one camera each, 0
             where cameras are shared.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cagefield.edits import Paste
 from cagefield.errors import CagefieldError, EditError
@@ -29,7 +30,15 @@ async def change_alignment(coordinator: Coordinator, page: Page, message: messag
     else:
         if len(message.points) != 3:
             raise CagefieldError(f"a level plane takes three points, not {len(message.points)}")
-        session.set_up(up_from_points(message.points, coordinator.up))
+        normal = up_from_points(message.points, coordinator.up)
+        tilt = _tilt(normal, coordinator.up)
+        session.set_up(normal)
+        page.notice("info", f"up: normal of the three points, tilted by {tilt:.1f}° from up so far")
+
+
+def _tilt(normal: ArrayLike, up: ArrayLike) -> float:
+    """Angle in degrees between two unit directions [3]."""
+    return float(np.degrees(np.arccos(np.clip(np.asarray(normal) @ np.asarray(up), -1.0, 1.0))))
 
 
 async def _take_floor(coordinator: Coordinator, page: Page) -> None:
@@ -39,7 +48,7 @@ async def _take_floor(coordinator: Coordinator, page: Page) -> None:
     if found is None:
         raise CagefieldError(NO_FLOOR)
     normal, share = np.array(found[0]), found[1]
-    tilt = np.degrees(np.arccos(np.clip(normal @ np.array(up), -1.0, 1.0)))
+    tilt = _tilt(normal, up)
     session.set_up(normal)
     page.notice("info", f"floor: {share:.0%} of the surfaces, tilted by {tilt:.1f}° from up so far")
 

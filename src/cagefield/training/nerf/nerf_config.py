@@ -35,9 +35,8 @@ class NerfConfig:
         lr_decay_steps: steps over which the learning rate falls to a tenth; None takes the whole run.
         precrop_steps: initial steps that take rays from the middle half of the photos.
         raw_noise_std: standard deviation of the noise added to raw densities; None takes nerf-pytorch's, 1
-        for
-            an unbounded capture, which may end empty without noise (density below its ReLU everywhere), else
-            0.
+            for an unbounded capture, which may end empty without noise (density below its ReLU everywhere),
+            else 0.
         ndc: train in normalized device coordinates; None does so where NDC suit the capture.
         seed: seed of weights, rays and jitter.
         bfloat16: evaluate the networks in bfloat16; None does so on a GPU that has it.
