@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cage_operations import KINDS, PATH, results
+from cagefield.edits.operations import Rotate
 
 CASES: list[dict[str, Any]] = json.loads(PATH.read_text(encoding="utf-8"))
 
@@ -24,3 +25,8 @@ def test_operations_give_the_cages_of_the_fixture(index: int) -> None:
         # Rounding of float64 in another order, on another machine's libraries.
         np.testing.assert_allclose(cage.corners, expected["corners"], rtol=0, atol=1e-12)
         np.testing.assert_allclose(cage.pivot, expected["pivot"], rtol=0, atol=1e-12)
+
+
+def test_texts_of_rotations_have_no_rounding_of_fits() -> None:
+    assert str(Rotate((-1.4e-09, 2.7e-09, 30.00000000001))) == "by (0, 0, 30) degrees"
+    assert str(Rotate((0.25, -1e-4, 0.0))) == "by (0.25, -0.0001, 0) degrees"

@@ -57,6 +57,7 @@ def test_detours_of_connected_points_are_found_in_the_background(on_slabs: TaskH
     asking: Any = SimpleNamespace(
         moving=False,
         drawn=lambda: (),
+        shown=SimpleNamespace(applied=()),
         detours_wanted=lambda: None if found else wanted,
         detours_found=lambda asked, detours: found.append((asked, detours)),
     )

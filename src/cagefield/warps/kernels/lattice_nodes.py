@@ -1,7 +1,7 @@
 """Numba kernels of the node lattices of lattices and meshes; see `lattice_shell` and `mesh_shell`.
 
 A line of up to `NODE_LANES` nodes along x goes through together: the innermost loops run over it. All is in
-float32, in the coordinates z in [-1,1]^3 of the outer cage, but for what is inside of a lattice.
+float32, in the coordinates z in [-1,1]^3 of the outer cage, but for the inside of a lattice.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def _velocities(grid, nodes, first, share, count, z, before, v, at, weights):
 def _flow_back(grid, nodes, steps, iterations, count, z, room, at, weights):
     """Takes z [3,L] back through all slices, in place; room [3,3,L] for velocities.
 
-    With d and e the last two changes of the velocity, and c = d . e / d . d, what is still to come is
+    With d and e the last two changes of the velocity, and c = d . e / d . d, the rest of the series is
     c / (1 - c) e (Aitken).
     """
     size = U(4) * nodes * nodes * nodes
