@@ -129,7 +129,7 @@ def _result_of(future: Future, patience: Patience) -> Any:
 
 @contextmanager
 def warned_losses(client: Client, others: str) -> Iterator[None]:
-    """Context after which a warning counts the workers that were lost in it, and names the work of the `others`."""
+    """Context after which a warning counts the workers lost in it, and names the work of the `others`."""
     lost: list[str] = []
 
     def noted(event: Any) -> None:
