@@ -50,20 +50,20 @@ def chromium_context(flags: Sequence[str] | None = None, **options: Any) -> Iter
     running = _running[0]
     running.contexts += 1
     asyncio._set_running_loop(running.loop)
-    own = context = None
-    has_ended = False
+    own = None
     try:
         if flags is not None:
             own = running.playwright.chromium.launch(executable_path=CHROMIUM, args=list(flags))
         context = (own or running.browser).new_context(**options)
         yield context
         context.close()
-        has_ended = True
+    except BaseException:
+        if own is None and running.contexts == 1:
+            close_chromium()  # a browser that may hang does not fail the next test as well
+        raise
     finally:
         if own is not None:
             own.close()
-        elif not has_ended and running.contexts == 1:
-            close_chromium()  # a browser that may hang does not fail the next test as well
         running.contexts -= 1
         if running.contexts == 0:
             # Playwright leaves its loop marked as running in this thread: other tests run loops of their own.

@@ -59,3 +59,13 @@ def test_the_first_error_ends_the_rest(threads: int) -> None:
     with pytest.raises(ValueError, match="part 5"):
         map_parts(work, 100_000, 1)
     assert len(done) < 100_000 - 1
+
+
+def test_parts_of_parts_start_no_threads(threads: int) -> None:
+    def work(part: slice) -> list[tuple[int, int]]:
+        own = threading.get_ident()
+        return map_parts(lambda inner: (own, threading.get_ident()), 8, 1)
+
+    found = [pair for each in map_parts(work, 6, 1) for pair in each]
+    assert len(found) == 48 and all(outer == inner for outer, inner in found)
+    assert map_parts(lambda part: part.stop, 4, 2) == [2, 4]

@@ -19,6 +19,7 @@ from cagefield.completion.patcher import PatchStage
 from cagefield.completion.surfaces import visibility
 from cagefield.edits import Edit, EditStack
 from cagefield.geometry.cage import Cage
+from cagefield.rendering.renderers import renderer_of
 from cagefield.scene.scene import Scene
 from cagefield.server.render_worker.cancellation import GivenUpError
 from cagefield.server.render_worker.edited_renderers import attained_refinement
@@ -114,6 +115,22 @@ def test_patches_are_cancelled_from_within_and_made_whole_later(cache: RendererC
     again = patcher.prepare(edits)
     first, second = (cache.plain.with_edits(stack).render(CAMERA).rgb for stack in (whole, again))
     np.testing.assert_array_equal(first, second)
+
+
+def test_visible_surfels_are_those_of_whole_images(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only the part of an image around the content is processed: less margin than its windows would show."""
+    monkeypatch.setattr(visibility, "IMAGE_SIZE_PIXELS", 90)
+    field = ball_field(resolution=33)
+    render = renderer_of(field).render
+    cropped, whole = [], []
+    for margin, found in ((visibility.MARGIN_PIXELS, cropped), (10_000, whole)):
+        monkeypatch.setattr(visibility, "MARGIN_PIXELS", margin)
+        seen = visibility.render_visibility(render, [CAMERA, CAMERA.resized(64, 64)], field.bounds)
+        found += [seen.surface.points, seen.surface.normals, seen.log_brightness, seen.hue, *seen.depths]
+        found += [seen.pairs.first.points, seen.pairs.second.normals, seen.pairs.log_change]
+    assert len(cropped[0]) > 500
+    for part, all_pixels in zip(cropped, whole, strict=True):
+        np.testing.assert_array_equal(part, all_pixels)
 
 
 def test_visibility_keeps_its_images_where_it_is_cancelled(

@@ -47,6 +47,13 @@ class Bench:
         self.scheduler.join(page)
         self.camera(page, seq, side=side)
 
+    def open_whole(self) -> None:
+        """Opens page 1, until it shows its whole picture."""
+        self.open(1)
+        self.step()
+        self.settle()
+        self.finish()
+
     def camera(self, page: int, seq: int, moving: bool = False, side: int = SIDE) -> None:
         self.scheduler.camera(page, seq, side, side, moving, self.now)
 
@@ -167,10 +174,7 @@ def test_moving_pictures_are_legible_where_speed_allows_it(rate: float, legible:
 def test_fixed_costs_make_no_picture_small_and_no_view_many_tiles() -> None:
     """Splats: a tenth of a second before the first pixel, then 5 million pixels a second."""
     b = Bench(5e6, fixed=0.1)
-    b.open(1)
-    b.step()
-    b.settle()
-    b.finish()
+    b.open_whole()
     assert (
         b.turn(range(2, 40)) >= 250
     )  # 0.4 of MOVING_SECONDS buys 316 pixels, less a step of RESOLUTION_SCALES
@@ -296,10 +300,7 @@ def test_a_lost_picture_is_rendered_again_and_an_impossible_one_is_not() -> None
 
 def test_a_drag_that_begins_on_a_whole_picture_draws_nothing() -> None:
     b = Bench()
-    b.open(1)
-    b.step()
-    b.settle()
-    b.finish()
+    b.open_whole()
     b.scheduler.edits(0, True, b.now)
     assert b.step() is None
     b.now += 10.0 * DRAG_SETTLE_SECONDS
@@ -329,10 +330,7 @@ def test_a_drag_abandons_a_refinement_and_does_not_draw_before_it_moves() -> Non
 def test_the_first_picture_of_the_first_drag_is_as_small_as_is_legible(rate: float) -> None:
     """Pictures without edits were measured, which cost less."""
     b = Bench(rate)
-    b.open(1)
-    b.step()
-    b.settle()
-    b.finish()
+    b.open_whole()
     widths = []
     for revision in (1, 2, 3, 4):
         b.scheduler.edits(revision, True, b.now)
@@ -345,10 +343,7 @@ def test_the_first_picture_of_the_first_drag_is_as_small_as_is_legible(rate: flo
 
 def test_a_slow_hand_is_not_followed_by_whole_pictures() -> None:
     b = Bench(2e7)
-    b.open(1)
-    b.step()
-    b.settle()
-    b.finish()
+    b.open_whole()
     for revision in range(1, 8):
         b.scheduler.edits(revision, True, b.now)
         assert [picture.moving for picture in b.finish()] == [True]
@@ -487,10 +482,7 @@ def test_nothing_else_is_done_between_the_pictures_of_a_drag() -> None:
 def drawing(here: DrawnHere, differing: Differing = everywhere) -> Bench:
     """A page that shows the whole picture, and from then on draws some of its pictures itself."""
     b = Bench(differing=differing)
-    b.open(1)
-    b.step()
-    b.settle()
-    b.finish()
+    b.open_whole()
     b.scheduler.drawing(1, here, b.now)
     return b
 
@@ -655,10 +647,7 @@ def test_a_gesture_cancels_the_refinement() -> None:
 @pytest.mark.parametrize("here", ["moving", "all"])
 def test_a_page_that_draws_gets_the_edits_with_each_refinement(here: DrawnHere) -> None:
     b = Bench(least=Refinement.DRAFT)
-    b.open(1)
-    b.step()
-    b.settle()
-    b.finish()
+    b.open_whole()
     b.scheduler.drawing(1, here, b.now)
     found: list[tuple[str, Refinement]] = []
     b.settle()

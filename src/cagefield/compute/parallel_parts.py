@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextvars import copy_context
+from contextvars import ContextVar, copy_context
 from typing import TypeVar
 
 from cagefield.compute import devices
 from cagefield.compute.cancellation import check_cancelled
 
 Result = TypeVar("Result")
+
+_is_part: ContextVar[bool] = ContextVar("is_part", default=False)
+"""Whether the caller is a part itself: all threads have work already."""
 
 
 def map_parts(function: Callable[[slice], Result], rows: int, part: int) -> list[Result]:
@@ -20,11 +23,16 @@ def map_parts(function: Callable[[slice], Result], rows: int, part: int) -> list
     """
     parts = [slice(begin, min(begin + part, rows)) for begin in range(0, max(rows, 1), part)]
     threads = min(devices.threads(), len(parts))
-    if threads < 2:
+    if threads < 2 or _is_part.get():
         return [function(each) for each in parts]
+
+    def run(part: slice) -> Result:
+        _is_part.set(True)
+        return function(part)
+
     pool = ThreadPoolExecutor(threads)
     try:
-        waiting = [pool.submit(copy_context().run, function, each) for each in parts]
+        waiting = [pool.submit(copy_context().run, run, each) for each in parts]
         results = []
         for each in waiting:
             results.append(each.result())
