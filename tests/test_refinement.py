@@ -19,7 +19,7 @@ from cagefield.completion.patcher import PatchStage
 from cagefield.completion.surfaces import visibility
 from cagefield.edits import Edit, EditStack
 from cagefield.geometry.cage import Cage
-from cagefield.rendering.renderers import renderer_of
+from cagefield.images.render_result import RenderResult
 from cagefield.scene.scene import Scene
 from cagefield.server.render_worker.cancellation import GivenUpError
 from cagefield.server.render_worker.edited_renderers import attained_refinement
@@ -120,12 +120,20 @@ def test_patches_are_cancelled_from_within_and_made_whole_later(cache: RendererC
 def test_visible_surfels_are_those_of_whole_images(monkeypatch: pytest.MonkeyPatch) -> None:
     """Only the part of an image around the content is processed: less margin than its windows would show."""
     monkeypatch.setattr(visibility, "IMAGE_SIZE_PIXELS", 90)
-    field = ball_field(resolution=33)
-    render = renderer_of(field).render
+    bounds = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
+
+    def render(camera: Camera) -> RenderResult:
+        """A ramp with sharp edges in a part of the image."""
+        y, x = np.mgrid[: camera.height, : camera.width].astype(np.float32)
+        is_ramp = (abs(x - 0.6 * camera.width) < 20) & (abs(y - 0.4 * camera.height) < 15)
+        depth = np.where(is_ramp, 3.0 + 0.002 * x + 0.001 * y, np.float32(np.inf))
+        rgb = np.stack([0.2 + 0.005 * x, 0.3 + 0.004 * y, 0.5 + 0.0 * x], axis=-1)
+        return RenderResult(rgb, is_ramp.astype(np.float32), depth)
+
     cropped, whole = [], []
     for margin, found in ((visibility.MARGIN_PIXELS, cropped), (10_000, whole)):
         monkeypatch.setattr(visibility, "MARGIN_PIXELS", margin)
-        seen = visibility.render_visibility(render, [CAMERA, CAMERA.resized(64, 64)], field.bounds)
+        seen = visibility.render_visibility(render, [CAMERA, CAMERA.resized(128, 96)], bounds)
         found += [seen.surface.points, seen.surface.normals, seen.log_brightness, seen.hue, *seen.depths]
         found += [seen.pairs.first.points, seen.pairs.second.normals, seen.pairs.log_change]
     assert len(cropped[0]) > 500
