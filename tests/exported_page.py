@@ -24,6 +24,9 @@ from chromium import chromium_context
 from gpu_objects import COUNT
 from page_fields import SIZE
 
+SCREENSHOTS = 6
+"""Most screenshots of one picture."""
+
 
 @contextmanager
 def shown(address: Path | str, touch: bool = False, size: int = SIZE) -> Iterator[Any]:
@@ -66,7 +69,17 @@ def settle(page: Any, level: str = "level?.last") -> None:
 
 
 def pixels(page: Any) -> NDArray[np.uint8]:
-    return np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
+    """RGB pixels [H,W,3] of a page at rest, once two screenshots in a row are equal, of SCREENSHOTS at most.
+
+    A page that is composed in software on a busy machine may lag behind its own canvas.
+    """
+    before = b""
+    for _ in range(SCREENSHOTS):
+        now = page.screenshot()
+        if now == before:
+            break
+        before = now
+    return np.asarray(Image.open(io.BytesIO(now)).convert("RGB"))
 
 
 def rendered(scene: Scene, camera: Camera, edits: bool = True) -> NDArray[np.uint8]:
