@@ -287,3 +287,38 @@ def test_a_field_ends_at_its_grid(edited: bool) -> None:
     frame = VoxelRenderer(field, edits, step=0.1).render(camera, background="black")
     oracle = render_sampled(field, camera, samples=1200, background="black", edits=edits)
     assert frame is not None and psnr(frame.rgb, oracle.rgb) > 45.0
+
+
+FLOWS = tuple(
+    Edit.continuous(Cage.box(center, inner), Cage.box(center, outer)).rotate(turn).translate(move)
+    for center, inner, outer, turn, move in [
+        ((-0.2, 0, 0.1), (0.5, 0.6, 0.6), (1.6, 1.6, 1.6), (0.1, 0.3, 0.2), (0, 0, 0)),
+        ((0.4, 0, 0.1), (0.4, 0.5, 0.6), (1.3, 1.4, 1.5), (0, 0, 0), (0.15, 0.1, -0.1)),
+    ]
+)
+"""Two flows that overlap, evaluated exactly."""
+
+
+def drawn(*edits: Edit) -> np.ndarray:
+    return VoxelRenderer(ball(), EditStack(edits)).render(CAMERA).rgb
+
+
+def test_maps_interpolated_along_rays_show_each_sample_mapped_alone():
+    # A discrete edit of empty space in the first one's box forbids interpolation.
+    alone = drawn(Edit.delete(Cage.box((-0.95, -0.75, 0.85), 0.04)), *FLOWS)
+    interpolated = drawn(*FLOWS)
+    difference = np.abs(interpolated - alone)
+    assert difference.max() < 0.01
+    assert np.sqrt((difference**2).mean()) < 5e-4
+
+
+def test_rays_step_over_no_cut_that_is_thinner_than_a_segment():
+    # A slit of half a voxel's width, through a shell and what it holds.
+    slit = Edit.delete(Cage.box((-0.2, 0.0, 0.1), (0.02, 1.2, 1.2)))
+    side = Camera.look_at((4.0, 0, 0.1), (0, 0, 0.1), width=8, height=8, fov_x=0.1)
+    cut = VoxelRenderer(ball(density=2.0), EditStack([slit, FLOWS[0]])).render(side)
+    whole = VoxelRenderer(ball(density=2.0), EditStack([FLOWS[0]])).render(side)
+    plain = sampled(ball(density=2.0), EditStack([slit, FLOWS[0]]), samples=1200, camera=side)
+    lost, expected = ((whole.opacity - other.opacity).mean() for other in (cut, plain))
+    assert expected > 0.005
+    assert 0.75 < lost / expected < 1.25

@@ -18,10 +18,12 @@ from cagefield.edits.device.kernels.edit_maps import EditArgs
 from cagefield.edits.device.packing import (
     ALONE,
     CHANGED_BOX,
+    CONTINUOUS,
     FIRST,
     FLOW,
     GRADED,
     IMAGE,
+    IS_CUT,
     OFFSET,
     PART_PLACE,
     RECORD,
@@ -38,6 +40,7 @@ from cagefield.edits.edit import Continuous, Edit, Paste
 from cagefield.edits.edit_map import EditMap
 from cagefield.edits.mapped_samples import SampleGrade
 from cagefield.edits.prepared import PreparedEdit
+from cagefield.typing import Mask
 from cagefield.warps import flow_table
 from cagefield.warps.flow_shell import FlowShell
 
@@ -85,7 +88,9 @@ class DeviceStack:
                 if layer is not None:
                     params[number, column] = next(places)
         for number in range(len(steps)):
-            params[number, ALONE] = not _meets(params[:number], params[number])
+            met = _meets(params[:number], params[number])
+            params[number, ALONE] = not met.any()
+            params[number, IS_CUT] = params[number, CONTINUOUS] == 0.0 or params[:number][met, IS_CUT].any()
         boxes = widened(np.concatenate([np.zeros((0, 2, 3))] + [step.boxes for step in steps]))
         packed = cls(params, nodes, len(steps), boxes.astype(np.float32))
         for array in (packed.params, packed.lattice, packed.boxes):
@@ -170,16 +175,15 @@ def _flow_table(edit: Continuous) -> NDArray[np.float32]:
     return flow_table.table(shell) if isinstance(shell, FlowShell) else np.zeros((0, 3), dtype=np.float32)
 
 
-def _meets(others: NDArray[np.float32], row: NDArray[np.float32]) -> bool:
-    """True if the box of another row meets that of `row`, or that of the part of the field that V shows."""
+def _meets(others: NDArray[np.float32], row: NDArray[np.float32]) -> Mask:
+    """Rows [E] whose box meets that of `row`, or that of the part of the field that V shows."""
     boxes = [(row[CHANGED_BOX : CHANGED_BOX + 3], row[CHANGED_BOX + 3 : CHANGED_BOX + 6])]
     if row[FIRST] == 0 and row[PART_PLACE] == 0:
         image = row[RECORDS + IMAGE : RECORDS + RECORD].reshape(8, 3)
         reach = np.abs(image[1:]).sum(axis=0)
         boxes.append((image[0] - reach, image[0] + reach))
-    meets = [
-        (others[:, CHANGED_BOX : CHANGED_BOX + 3] <= high)
-        & (others[:, CHANGED_BOX + 3 : CHANGED_BOX + 6] >= low)
-        for low, high in boxes
-    ]
-    return bool(np.any([each.all(axis=1) for each in meets]))
+    meets = np.zeros(len(others), bool)
+    for low, high in boxes:
+        near = others[:, CHANGED_BOX : CHANGED_BOX + 3] <= high
+        meets |= (near & (others[:, CHANGED_BOX + 3 : CHANGED_BOX + 6] >= low)).all(axis=1)
+    return meets

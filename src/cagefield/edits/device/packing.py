@@ -49,7 +49,8 @@ GRADE_DENSITY = GRADED + 10  # factor of density at weight 1
 GRADE_INNER = GRADED + 11  # frame [4,3] of the inner cage of a `GradeFalloff`, of a continuous edit
 GRADE_OUTER = GRADED + 23  # frame [4,3] of the outer cage
 STILL = GRADED + 35  # 1 where the map is the identity: an edit that grades and moves nothing
-WIDTH = GRADED + 36
+IS_CUT = GRADED + 36  # 1 for a discrete edit, and where samples of the edit may be moved on by one
+WIDTH = GRADED + 37
 
 EDGE = 1e-6
 """A sample counts as inside a hexahedron when its xi is within this of [-1,1]^3: rounding in float32."""

@@ -1,9 +1,9 @@
-"""One edit along a whole ray: where the edit is affine and shown by a lattice, so is the ray in it.
+"""One edit along a stretch of a ray: where the edit is affine and shown by a lattice, so is the ray in it.
 
-A ray that meets one edit only, whose cages are parallelepipeds and whose shell is a lattice (`SIMPLE` in
-`cagefield.edits.device.packing`), runs straight through the inner region also in canonical space, and
-straight
-through the lattice. Both lines and where they begin and end are found once; a sample on them costs a
+A ray is walked in stretches, along each of which the same edits' boxes hold it. In a stretch of one edit
+only, whose cages are parallelepipeds and whose shell is a lattice (`SIMPLE` in
+`cagefield.edits.device.packing`), it runs straight through the inner region also in canonical space, and
+straight through the lattice. Both lines and where they begin and end are found once; a sample on them costs a
 multiplication in the inner region and one lattice lookup in the shell. Of a discrete edit, V and the region
 are such stretches of the ray.
 """
@@ -22,6 +22,7 @@ from cagefield.edits.device.packing import (
     CONTINUOUS,
     EDGE,
     FIRST,
+    IS_CUT,
     LAST,
     MATRIX,
     NODE_BOX,
@@ -41,6 +42,8 @@ STAYED, BENT, STRAIGHT = 0, 1, 2
 
 EditedRay = qd.types.struct(
     edit=qd.i32,
+    until=qd.f32,
+    is_continuous=qd.i32,
     resolution=qd.i32,
     first=qd.i32,
     part=qd.i32,
@@ -52,33 +55,44 @@ EditedRay = qd.types.struct(
     node=vec3,
     node_velocity=vec3,
 )
-"""A ray o + t d in deformed space, in the one simple edit that it meets.
+"""A stretch of a ray o + t d in deformed space, in the one simple edit whose box holds it.
 
-edit: its number, or -1 where samples must be mapped one by one; resolution, first: its lattice, of 0 nodes
-for a discrete edit; part, under: the places (`fields.voxel_layers`) at which samples of V and of a discrete
-edit's
-region are read; inner, outer: [t_in, t_out] in the inner region and in the outer cage, or the region;
-canonical + t velocity: the inner region's samples in canonical space; node + t node_velocity: the ray in node
-units of the lattice.
+edit: its number, MANY where samples must be mapped one by one, NONE where no edit's box holds the stretch;
+until: the ray parameter at which it ends; is_continuous: 1 where discrete edits
+move none of its samples;
+resolution, first: the edit's lattice, of 0 nodes for a discrete edit; part, under: the places
+(`fields.voxel_layers`) at which samples of V and of a discrete edit's region are read; inner, outer: [t_in,
+t_out] in the inner region and in the outer cage, or the region; canonical + t velocity: the inner region's
+samples in canonical space; node + t node_velocity: the ray in node units of the lattice.
 """
+
+NONE, MANY = -2, -1
 
 
 @qd.func
-def edited_ray(origin: vec3, d: vec3, edits: EditArgs):
-    """The `EditedRay` of a ray with unit direction d."""
-    ray = EditedRay(edit=-1)
+def edited_ray(t: qd.f32, origin: vec3, d: vec3, edits: EditArgs):
+    """The `EditedRay` from t on of a ray with unit direction d."""
+    ray = EditedRay(edit=NONE, until=1e30, is_continuous=1, inner=vec2(1e30, -1e30), outer=vec2(1e30, -1e30))
     inverse = safe_inverse(d)
     met = 0
-    e = -1
+    e = 0
     for n in range(edits.count):
         box = slab(
             origin, inverse, read3(edits.params, n, CHANGED_BOX), read3(edits.params, n, CHANGED_BOX + 3)
         )
-        if box.x <= box.y:
-            met += 1
-            e = n
-    if met == 1:
-        if edits.params[e, ALONE] > 0.5:
+        if box.x <= box.y and t <= box.y:
+            if t >= box.x:
+                met += 1
+                e = n
+                ray.until = qd.min(ray.until, box.y)
+                if edits.params[n, IS_CUT] > 0.5:
+                    ray.is_continuous = 0
+            else:
+                ray.until = qd.min(ray.until, box.x)
+    if met > 0:
+        ray.edit = MANY
+        if met == 1 and edits.params[e, ALONE] > 0.5:
+            # Earlier edits do not reach where this one takes samples, later ones do not hold them.
             if edits.params[e, SIMPLE] > 0.5:
                 ray.edit = e
                 ray.resolution = qd.cast(edits.params[e, RESOLUTION], qd.i32)
@@ -95,16 +109,13 @@ def edited_ray(origin: vec3, d: vec3, edits: EditArgs):
                 ray.edit = e
                 ray.part = qd.cast(edits.params[e, PART_PLACE], qd.i32)
                 ray.under = qd.cast(edits.params[e, UNDER_PLACE], qd.i32)
-                ray.outer = vec2(1e30, -1e30)
                 if edits.params[e, LAST] > 1.5:
                     ray.outer, _at = through(origin, d, edits.params, e, RECORDS + RECORD)
-        if ray.edit >= 0:
-            ray.inner = vec2(1e30, -1e30)
-            if edits.params[e, FIRST] < 0.5:
-                ray.inner, at = through(origin, d, edits.params, e, RECORDS)
-                q, v = image(at, d, edits.params, e, RECORDS)
-                ray.canonical = q
-                ray.velocity = v
+        if ray.edit >= 0 and edits.params[e, FIRST] < 0.5:
+            ray.inner, at = through(origin, d, edits.params, e, RECORDS)
+            q, v = image(at, d, edits.params, e, RECORDS)
+            ray.canonical = q
+            ray.velocity = v
     return ray
 
 
@@ -161,7 +172,7 @@ def map_along(
                 moved = BENT
             else:
                 place = ray.under
-    else:
+    elif ray.edit == MANY:
         q, v, place = map_sample(p, d, edits, flows)
         if qd.abs(q - p).max() > 0.0:
             moved = BENT

@@ -19,7 +19,6 @@ from cagefield.rendering.voxels.kernels.edited_ray import (
     STRAIGHT,
     EditedRay,
     edited_ray,
-    map_along,
 )
 from cagefield.rendering.voxels.kernels.grid import (
     F32,
@@ -34,6 +33,7 @@ from cagefield.rendering.voxels.kernels.grid import (
     to_grid,
     vec3,
 )
+from cagefield.rendering.voxels.kernels.map_segments import MapSegment, map_in_segments
 from cagefield.rendering.voxels.kernels.ray_grid import (
     OccupancyArgs,
     is_occupied,
@@ -150,7 +150,8 @@ def march_tiles(
                 t_end = hit.y
             edit_in = 1e30
             edit_out = -1e30
-            ray = EditedRay(edit=-1)
+            ray = EditedRay(until=-1e30)
+            segment = MapSegment(end=-1e30)
             turned = basis
             if qd.static(edited != UNEDITED):
                 world = safe_inverse(d)
@@ -165,10 +166,6 @@ def march_tiles(
                     if through.x <= through.y:
                         edit_in = qd.min(edit_in, through.x)
                         edit_out = qd.max(edit_out, through.y)
-                if edit_in <= edit_out:
-                    ray = edited_ray(camera.origin, d, edits)
-                    if ray.edit >= 0 and ray.inner.x <= ray.inner.y:
-                        turned = sh_basis(ray.velocity / qd.max(ray.velocity.norm(), 1e-20), K)
             T = 1.0
             rgb = vec3(0.0, 0.0, 0.0)
             normal = vec3(0.0, 0.0, 0.0)
@@ -188,8 +185,14 @@ def march_tiles(
                     view = d
                     if qd.static(edited != UNEDITED):
                         if t >= edit_in and t <= edit_out:
-                            p = camera.origin + t * d
-                            canonical, view, place, moved = map_along(ray, t, p, d, edits, edited % 2 == 0)
+                            if t > ray.until:
+                                ray = edited_ray(t, camera.origin, d, edits)
+                                segment.end = -1e30
+                                if ray.edit >= 0 and ray.inner.x <= ray.inner.y:
+                                    turned = sh_basis(ray.velocity / qd.max(ray.velocity.norm(), 1e-20), K)
+                            canonical, view, place, moved = map_in_segments(
+                                segment, ray, t, h, camera.origin, d, edits, edited % 2 == 0
+                            )
                             if moved != STAYED:
                                 g = to_grid(canonical, grid, contracted)
                     # The last bricks reach beyond the grid, and an edit may map samples there.
