@@ -4,9 +4,10 @@ python -m benchmarks.editor_latency SCENE... [--repeats 5] [-o benchmarks/result
 
 Each repetition starts `cagefield view`, waits for the first whole picture, adds a cage around the middle of
 the content, and drags it up, down, up by the gizmo: 1.5 s with ten moves of the mouse, then until the final
-picture. Kernels are cached on disk, as from a second start on (`--empty-cache`: none are); light, visibility
-and patches are not. A move counts from its mouse event to the frame after the one that drew its picture, by
-the page's clock. After letting go the whole picture without light counts, then the final one.
+picture. Kernels are cached on disk, as from a second start on (`--empty-cache`: none are), and so is the
+field's light, as `cagefield train` and `import` leave it (`--unlit`: it is not); patches are not. A move
+counts from its mouse event to the frame after the one that drew its picture, by the page's clock. After
+letting go the whole picture without light counts, then the final one.
 """
 
 from __future__ import annotations
@@ -44,6 +45,11 @@ WINDOW = 1104, 850
 DRAGS, MOVES, DRAG_SECONDS, DRAG_PX = 3, 10, 1.5, 40
 PATIENCE = 300.0
 
+PREPARATION = (
+    "import sys; from cagefield.cli.light_preparation import prepare_light; prepare_light(sys.argv[1])"
+)
+"""Program that does what the commands that make scenes do last."""
+
 
 @dataclass
 class Drag:
@@ -69,6 +75,8 @@ class EditorLatency:
     kinds: tuple[Kind, ...] = ("continuous", "discrete")
     empty_cache: bool = False
     """Start each repetition without compiled kernels."""
+    unlit: bool = False
+    """Start each repetition without the field's light."""
     pause: float = 0.0
     """Seconds between the cage and the first drag, in which a user looks at it."""
     gpu: bool = False
@@ -109,6 +117,7 @@ class EditorLatency:
         command = (
             "python -m benchmarks.editor_latency SCENE..."
             + (" --empty-cache" if self.empty_cache else "")
+            + (" --unlit" if self.unlit else "")
             + (f" --pause {self.pause:g}" if self.pause else "")
         )
         notes = f"Medians of {self.repeats} fresh editors; longest in brackets. {machine}. `{command}`"
@@ -131,6 +140,8 @@ class EditorLatency:
         with tempfile.TemporaryDirectory() as scratch, sync_playwright() as playwright:
             copy = Path(scratch) / "scene"
             shutil.copytree(scene, copy)
+            if not self.unlit:
+                subprocess.run([sys.executable, "-c", PREPARATION, str(copy)], check=True, env=environment)
             (copy / "edits.yaml").write_text("version: 1\nedits: []\n")
             server = subprocess.Popen(
                 [sys.executable, "-m", "cagefield", "view", str(copy), "--port", "0", "--no-browser"],

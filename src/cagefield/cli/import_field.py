@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import tyro
 
+from cagefield.cli.light_preparation import prepare_light
 from cagefield.cli.options import Axes, Baking, BakingOptions, Device, Flag, Output, Up
 from cagefield.errors import CagefieldError
 
@@ -69,7 +70,8 @@ class ImportField:
         else:
             scene, lines = self._field()
         scene.save(self.out, overwrite=self.overwrite)
-        print(f"{lines}\nscene written to {self.out}")
+        print(f"{lines}\nscene written to {self.out}", flush=True)
+        prepare_light(self.out)
 
     def _splats(self) -> tuple[Scene, str]:
         """The scene of a splat file, and a text report of its contents."""

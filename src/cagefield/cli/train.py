@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from cagefield.cli.light_preparation import prepare_light
 from cagefield.cli.options import (
     BakingOptions,
     Device,
@@ -137,7 +138,7 @@ class Train:
             figures, finished = summary(voxels), voxels.finished
         with self._kept(checkpoint, finished):
             scene.save(self.out, overwrite=self.overwrite or self.resume)
-        print(f"{figures}\nscene written to {self.out}")
+        print(f"{figures}\nscene written to {self.out}", flush=True)
         if not finished:
             print("stopped early; the same command with --resume continues")
             raise KeyboardInterrupt
@@ -145,6 +146,7 @@ class Train:
             checkpoint.unlink(missing_ok=True)
         else:
             shutil.rmtree(checkpoint, ignore_errors=True)
+        prepare_light(self.out)
 
     def checkpoint(self) -> Path:
         """File of the interrupted training, or the folder of its blocks."""

@@ -1,0 +1,46 @@
+"""Commands that make scenes leave the light of the field for the editor, in a limited time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cagefield import Scene
+from cagefield.cli import light_preparation
+from cagefield.completion import patch_cache, patcher
+from cagefield.formats.splats.splat_files import write_splats
+from commands import printed
+from splat_rooms import room
+
+
+@pytest.fixture(autouse=True)
+def patches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(patch_cache, "cache_root", lambda: tmp_path / "cache")
+    monkeypatch.setattr(patch_cache, "MIN_CACHED_SECONDS", -1.0)
+    return tmp_path / "cache" / "patches"
+
+
+@pytest.fixture
+def splats(tmp_path: Path) -> Path:
+    write_splats(room(box=True), tmp_path / "room.ply")
+    return tmp_path / "room.ply"
+
+
+def test_an_opened_scene_finds_the_light_that_its_import_computed(splats, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(light_preparation, "MAX_SECONDS", 600.0)
+    assert "light ready" in printed(capsys, "import", splats, "-o", tmp_path / "scene")
+
+    def computed(*_arguments: object) -> None:
+        raise AssertionError("the light was computed again")
+
+    monkeypatch.setattr(patcher, "render_visibility", computed)
+    monkeypatch.setattr(patcher, "fit_light_model", computed)
+    assert Scene.open(tmp_path / "scene").patcher.light_model is not None
+
+
+def test_a_light_that_takes_too_long_is_left_to_the_editor(splats, patches, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(light_preparation, "MAX_SECONDS", 1e-9)
+    assert "left to the editor" in printed(capsys, "import", splats, "-o", tmp_path / "scene")
+    assert not list(patches.glob("*.npz"))
+    assert len(Scene.open(tmp_path / "scene").field) == len(room(box=True))
