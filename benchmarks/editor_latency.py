@@ -175,6 +175,7 @@ class EditorLatency:
         before = page.evaluate("cagefield.latency.presented.length")
         began = page.evaluate("cagefield.latency.moves.length")
         page.mouse.move(grip["x"], grip["y"])
+        page.evaluate(SHOWN)
         page.mouse.down()
         for n in range(1, MOVES + 1):
             page.mouse.move(grip["x"], grip["y"] - direction * DRAG_PX * n / MOVES)
@@ -209,6 +210,9 @@ WHOLE = (
 )
 """First whole picture after a time, whatever it lacks: a function of the page."""
 
+SHOWN = "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+"""Waits until the next frame is on the screen: a handle is seen, and highlighted, before it is pressed."""
+
 
 def open_cage(page: Page, edits: str) -> None:
     """Adds the cage in an editor that has just shown its first whole picture, ready to be dragged."""
@@ -220,6 +224,7 @@ def open_cage(page: Page, edits: str) -> None:
     until(page, "cagefield.now.state.edits.length === 1 && cagefield.now.state.selected !== null")
     page.click(".tools .mode-edit")
     until(page, "cagefield.grip('Z') !== null")
+    page.evaluate(SHOWN)
 
 
 def cage_file(folder: Path, kind: Kind) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.lattice import Lattice
 
-CHUNK_POINTS = 500
+CHUNK_POINTS = 100
 """Points at which a lattice is compared with the exact map at a time: hundredths of a second."""
 
 

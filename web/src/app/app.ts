@@ -243,6 +243,7 @@ export class App {
     const cage = targetCage(shownCages(edit, this.drag), dragTarget(now));
     if (this.gizmo.dragging) this.gizmo.moveTo(this.gizmoPosition ?? new Vector3(...cage.pivot));
     else this.gizmo.show(now.tool, now.axes, cage, this.gizmoPosition, carrierRotation(edit.carrier));
+    this.gizmo.compile(() => this.viewport.drawUnseen());
   }
 
   /** The cages of an edit as they are drawn, a drag in progress included. */

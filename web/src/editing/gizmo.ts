@@ -37,6 +37,7 @@ export class Gizmo {
   private readonly controls: TransformControls;
   private readonly start = { position: new Vector3(), quaternion: new Quaternion(), device: { x: 0, y: 0 } };
   private axes: Axes = "world";
+  private compiled = false;
 
   constructor(
     scene: Scene,
@@ -62,6 +63,22 @@ export class Gizmo {
     this.proxy.scale.set(1, 1, 1);
     this.proxy.updateMatrixWorld();
     if (!this.isShown) this.controls.attach(this.proxy);
+  }
+
+  /**
+   * Compiles the shaders of the gizmo's highlight and of its motion, once, before the mouse reaches it; `draw` draws the
+   * scene.
+   */
+  compile(draw: () => void): void {
+    if (this.compiled || !this.isShown || this.dragging) return;
+    this.compiled = true;
+    const { controls } = this;
+    const { axis } = controls;
+    controls.axis = "Z";
+    controls.dragging = true;
+    draw();
+    controls.dragging = false;
+    controls.axis = axis;
   }
 
   hide(): void {

@@ -109,6 +109,16 @@ export class Viewport {
     });
   }
 
+  /** Draws the scene into one pixel, which the frame that follows covers: its shaders are compiled then. */
+  drawUnseen(): void {
+    const { renderer } = this;
+    renderer.setRenderTarget(null);
+    renderer.setScissor(0, 0, 1, 1);
+    renderer.setScissorTest(true);
+    renderer.render(this.scene, this.camera);
+    renderer.setScissorTest(false);
+  }
+
   /**
    * Looks from a camera-to-world matrix, row by row, and orbits around the point of its axis closest to
    * `around`.
