@@ -29,6 +29,7 @@ from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
 from cagefield.completion.surfaces.patch_bounds import patch_box
 from cagefield.completion.surfaces.splat_voxelization import choose_voxel_size, voxelize_splats
 from cagefield.completion.surfaces.visibility import CameraVisibility
+from cagefield.compute.cancellation import check_cancelled
 from cagefield.edits import Continuous, Delete, Discrete, Edit, EditMap, EditStack, Paste, PreparedEdit
 from cagefield.edits.options import Clone
 from cagefield.edits.patch import NewLight, Pasted, SplatPatch
@@ -134,11 +135,15 @@ def extract_splat_block(
     field = splats.field
     box = light_box(edit, 0.0, model.max_radius, model.shadow_directions)
     moved = _crop_splats(field, moved_splats(splats, below), box)
+    check_cancelled()
     placed = where_they_are(field, moved)
+    check_cancelled()
     voxel = choose_voxel_size(placed, box)
     box = light_box(edit, voxel, model.max_radius, model.shadow_directions)
     grid = voxelize_splats(placed, box, voxel)
+    check_cancelled()
     known = KnownSplats.from_moved(field, placed, grid, moved)
+    check_cancelled()
     block = extract_block(grid, EditStack(), box)
     return SplatBlock(box, block, CanonicalLight.from_block(block, edit, model), known, splats.scene)
 

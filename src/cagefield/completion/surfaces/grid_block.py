@@ -87,6 +87,7 @@ class GridBlock:
 
         Photos do not constrain the density behind a surface: fields are hollow there, or foggy.
         """
+        check_cancelled()
         solid = np.pad(self.solid, 2)
         closed = ndimage.binary_closing(solid, ndimage.generate_binary_structure(3, 2))[2:-2, 2:-2, 2:-2]
         return np.asarray(
@@ -104,7 +105,9 @@ class GridBlock:
         """Unit normals [X,Y,Z,3], against the gradient of the smoothed opacity; 0 without a gradient."""
         if min(self.shape) < 3:
             return np.zeros((*self.shape, 3), np.float32)
+        check_cancelled()
         smooth = ndimage.gaussian_filter(1.0 - np.exp(-self.depth), 1.2)
+        check_cancelled()
         slope = -np.stack(np.gradient(smooth), axis=-1) / self.field.voxel_size
         length = np.linalg.norm(slope, axis=-1, keepdims=True)
         return np.asarray(slope / np.maximum(length, 1e-6), np.float32)

@@ -58,6 +58,7 @@ def voxelize_splats(splats: SplatField, box: Array, voxel: float, *, has_colors:
     check_cancelled()
     grid = SplatGrid(wide, bounds[0], voxel, (int(count[0]), int(count[1]), int(count[2])))
     density = np.where(covered, grid.density(), np.float32(0.0))
+    check_cancelled()
     is_stored = density * voxel > MIN_OPTICAL_DEPTH
     colors = grid.colors(is_stored) if has_colors else np.full((np.count_nonzero(is_stored), 3), 0.5)
     sh = ((colors[:, None] - 0.5) / C0).astype(np.float32)
