@@ -237,7 +237,7 @@ def test_a_missing_tensor_is_named(tmp_path: Path, layout: str) -> None:
         rest = {key: value for key, value in content["pipeline"].items() if key != name}
         torch.save({**content, "pipeline": rest}, checkpoint)
         if (found := _refusal(checkpoint)) is not None:
-            assert "pipeline" in found or "config" in found or "neither" in found, (name, found)
+            assert "pipeline" in found or "config" in found or "neither" in found or "another model" in found, name
         else:
             raise AssertionError(f"{name} may be missing")
 
