@@ -5,7 +5,6 @@ from __future__ import annotations
 import socket
 import threading
 import time
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -24,7 +23,7 @@ from cagefield.errors import CagefieldError
 
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(scheduler_address, "NOTICE_SECONDS", 0.05)
+    monkeypatch.setattr(scheduler_address, "CONNECTION_NOTICE_SECONDS", 0.05)
     monkeypatch.setattr(scheduler_address, "REFUSED_SECONDS", 0.2)
     monkeypatch.setattr(scheduler_address, "_AGAIN_SECONDS", 0.01)
 
@@ -44,7 +43,7 @@ def test_an_address_where_nobody_listens_is_given_up_and_announced_before(port: 
         pytest.warns(UserWarning, match=f"waiting for a scheduler at {address}, 30 s at most"),
         pytest.raises(
             CagefieldError,
-            match=rf"no scheduler listens at {address} \(connection refused, \d+ s\); check the address, or start",
+            match=rf"listens at {address} \(connection refused, \d+ s\); check the address, or start",
         ),
         connect(address),
     ):
@@ -75,7 +74,7 @@ def test_a_scheduler_that_begins_late_is_reached(monkeypatch: pytest.MonkeyPatch
         late.bind(("127.0.0.1", 0))
         timer = threading.Timer(0.05, late.listen)
         timer.start()
-        wait_for_listener("tcp://127.0.0.1:{}".format(late.getsockname()[1]), 60.0)
+        wait_for_listener(f"tcp://127.0.0.1:{late.getsockname()[1]}", 60.0)
         timer.join()
 
 
@@ -100,7 +99,7 @@ def test_a_listener_that_says_nothing_is_given_up(monkeypatch: pytest.MonkeyPatc
     pytest.importorskip("distributed")
     monkeypatch.setattr(connection, "CONNECT_SECONDS", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as mute:
-        address = "tcp://127.0.0.1:{}".format(mute.getsockname()[1])
+        address = f"tcp://127.0.0.1:{mute.getsockname()[1]}"
         with (
             pytest.warns(UserWarning, match=f"waiting for a scheduler at {address}"),
             pytest.raises(CagefieldError, match=rf"no scheduler replies at {address} \(no reply in 0 s\)"),
@@ -122,7 +121,7 @@ def refusing() -> None:
 
 
 def test_a_wait_that_is_over_soon_is_not_announced(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(scheduler_address, "NOTICE_SECONDS", 600.0)
+    monkeypatch.setattr(scheduler_address, "CONNECTION_NOTICE_SECONDS", 600.0)
     before = set(threading.enumerate())
     with announced_wait("tcp://farm:8786", 30.0):
         (timer,) = set(threading.enumerate()) - before
@@ -144,7 +143,9 @@ def test_the_address_in_a_scheduler_file(tmp_path: Path) -> None:
 def test_files_that_are_no_scheduler_files(tmp_path: Path, text: str) -> None:
     path = tmp_path / "notes.json"
     path.write_text(text)
-    with pytest.raises(CagefieldError, match=r"notes\.json is no scheduler file with an address; give one of"):
+    with pytest.raises(
+        CagefieldError, match=r"notes\.json is no scheduler file with an address; give one that"
+    ):
         read_scheduler_file(path)
 
 
@@ -160,7 +161,7 @@ def test_certificates_are_asked_for_where_the_file_names_an_encrypted_address(tm
     path = tmp_path / "scheduler.json"
     path.write_text('{"address": "tls://127.0.0.1:8786"}')
     with (
-        pytest.raises(CagefieldError, match="tls://127.0.0.1:8786 needs certificates; give --cluster-tls"),
+        pytest.raises(CagefieldError, match=r"tls://127\.0\.0\.1:8786 needs certificates"),
         connect(str(path)),
     ):
         pass

@@ -236,5 +236,5 @@ def test_a_missing_tensor_is_named(tmp_path: Path, layout: str) -> None:
     for name in [n for n in content["pipeline"] if "embedding" not in n]:
         rest = {key: value for key, value in content["pipeline"].items() if key != name}
         torch.save({**content, "pipeline": rest}, checkpoint)
-        with pytest.raises(FieldError, match="pipeline|config|neither|another model"):
+        with pytest.raises(FieldError, match=r"pipeline|config|neither|another model"):
             read_external(checkpoint)

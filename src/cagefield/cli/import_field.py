@@ -73,7 +73,7 @@ class ImportField:
         print(f"{lines}\nscene written to {self.out}")
 
     def _check_file(self) -> None:
-        """Raises CagefieldError for a config, and for a folder without splats; a checkpoint in it is named."""
+        """Raises CagefieldError for a config, and for a folder without splats, naming a checkpoint in it."""
         from cagefield.formats.splats.detection import is_splat_folder
 
         if self.file.suffix.lower() in (".yml", ".yaml"):

@@ -127,9 +127,9 @@ def connect(cluster: int | str, tls: TlsFiles | None = None) -> Iterator[Client]
             target = None
         client = opened.enter_context(_client(cluster, target, security))
         if target is not None:
-            from cagefield.cluster.worker_plugin import InterruptPlugin
+            from cagefield.cluster.worker_plugin import LocalWorkerPlugin
 
-            client.register_plugin(InterruptPlugin())
+            client.register_plugin(LocalWorkerPlugin())
         yield client
 
 

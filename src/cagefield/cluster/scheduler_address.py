@@ -23,7 +23,7 @@ from cagefield.files.safe_open import read_bytes
 
 _Result = TypeVar("_Result")
 
-NOTICE_SECONDS = 2.0
+CONNECTION_NOTICE_SECONDS = 2.0
 """Time without a scheduler before a warning."""
 REFUSED_SECONDS = 5.0
 """Time of refused connections after which nobody listens: a scheduler begins in two to three seconds."""
@@ -46,15 +46,15 @@ def read_scheduler_file(path: Path) -> str:
     if isinstance(address, str) and address.isprintable() and _host_and_port(address) is not None:
         return address
     raise CagefieldError(
-        f"--cluster {path} is no scheduler file with an address; give one of `dask scheduler --scheduler-file`"
+        f"--cluster {path} is no scheduler file with an address; give one that `dask scheduler` wrote"
     )
 
 
 @contextmanager
 def announced_wait(address: str, seconds: float) -> Iterator[None]:
-    """Context of a wait for a scheduler; where it takes NOTICE_SECONDS a warning names address and time."""
+    """Context of a wait for a scheduler; after CONNECTION_NOTICE_SECONDS a warning names address and time."""
     text = f"waiting for a scheduler at {address}, {seconds:.0f} s at most"
-    timer = threading.Timer(NOTICE_SECONDS, warnings.warn, (text,))
+    timer = threading.Timer(CONNECTION_NOTICE_SECONDS, warnings.warn, (text,))
     timer.daemon = True
     timer.start()
     try:

@@ -76,7 +76,9 @@ def read_instant_ngp(path: Path) -> ExternalCheckpoint:
     snapshot = _mapping("snapshot", config["snapshot"])
     mode = str(snapshot.get("mode", "nerf")).lower()
     if mode != "nerf" or "nerf" not in snapshot:
-        raise FieldError(f"a snapshot of Instant-NGP in mode {mode:.20}; only NeRFs are read, save a snapshot of one")
+        raise FieldError(
+            f"a snapshot of Instant-NGP in mode {mode:.20}; only NeRFs are read, save a snapshot of one"
+        )
     if whole_number("version", snapshot.get("version", 0), 0, 1 << 30) < 1:
         raise FieldError("a snapshot of an old version of Instant-NGP; save it again with a newer one")
     nerf = _mapping("nerf", snapshot["nerf"])
@@ -159,7 +161,9 @@ def _networks(
     """(density network over its hash grid, color network) of the flat parameters."""
     encoding = _mapping("encoding", config.get("encoding"))
     if _name(encoding, "otype") not in ("hashgrid", "grid") or _name(encoding, "type", "hash") != "hash":
-        raise FieldError(f"encoding is {_name(encoding, 'otype')!r:.40}; only HashGrid is read, train with base.json")
+        raise FieldError(
+            f"encoding is {_name(encoding, 'otype')!r:.40}; only HashGrid is read, train with base.json"
+        )
     if _name(encoding, "interpolation", "linear") != "linear":
         raise FieldError(f"interpolation is {_name(encoding, 'interpolation')!r:.40}; only Linear is read")
     if _name(encoding, "hash", "coherentprime") != "coherentprime":

@@ -41,9 +41,9 @@ def read_external(path: Path | str, config: Path | None = None) -> ExternalCheck
     """Field of another program's checkpoint; None for nerf-pytorch's.
 
     Raises:
-        FieldError: a checkpoint of another program, a config for another checkpoint than nerfacto's, missing or damaged file, objects
-            beside tensors and plain values (which are not unpickled), missing or misshapen tensors, missing
-            PyTorch.
+        FieldError: a checkpoint of another program, a config for another checkpoint than nerfacto's, missing
+            or damaged file, objects beside tensors and plain values (which are not unpickled), missing or
+            misshapen tensors, missing PyTorch.
     """
     path = Path(path)
     if not os.path.exists(path):  # also where the name is too long for a file
