@@ -116,7 +116,7 @@ def test_console_script_reports_bad_input_without_traceback(tmp_path: Path) -> N
     assert done.returncode == 2 and done.stdout == ""
     assert done.stderr == (
         f"cagefield: scene {tmp_path / 'nowhere'} does not exist; "
-        "give the folder that `cagefield train -o` wrote\n"
+        "give the folder that `cagefield train -o` or `cagefield import -o` wrote\n"
     )
 
 

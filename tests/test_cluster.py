@@ -18,6 +18,8 @@ import pytest
 
 from cagefield import Cage, Edit, EditStack, Scene
 from cagefield.cameras.camera import Camera
+from cagefield.cameras.keyframe_files import dump_path
+from cagefield.cameras.keyframes import Keyframe
 from cagefield.cli import main
 from cagefield.cli.frame_files import FrameFiles, parse_frames
 from cagefield.cluster import connection
@@ -141,6 +143,18 @@ def test_an_interrupt_cancels_the_others_and_keep_adds_them(
     assert 0 < len(found) < len(expected) and found.items() <= expected.items()
     run(*words)
     assert files_of(many) == expected
+
+
+@pytest.mark.nightly
+@needs_dask
+def test_a_camera_path_of_a_cluster_is_the_video_of_one_process(scene: Path, tmp_path: Path) -> None:
+    poses = [tuple(camera.c2w.ravel().tolist()) for camera in ball_cameras(2)]
+    path = tmp_path / "path.json"
+    path.write_text(dump_path([Keyframe(pose, 40.0, 1.0) for pose in poses], loop=False))
+    options = ["--camera-path", path, "--fps", 3, "--size", "32x24"]
+    run("render", scene, "-o", tmp_path / "one.mp4", *options)
+    run("render", scene, "-o", tmp_path / "many.mp4", *options, "--cluster", 2)
+    assert (tmp_path / "many.mp4").read_bytes() == (tmp_path / "one.mp4").read_bytes()
 
 
 @pytest.mark.nightly

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
+import os
+import subprocess
+import sys
+import time
 import urllib.error
 import urllib.request
 import warnings
@@ -58,3 +62,32 @@ def test_local_clusters_serve_no_pages_and_run_side_by_side() -> None:
 def test_an_error_of_a_task_has_its_name() -> None:
     with pytest.raises(CagefieldError, match="block 2: no photo is left; take some"):
         dict(run_tasks(1, {"block 2": Task(refusing)}, device="cpu"))
+
+
+@pytest.mark.nightly
+@pytest.mark.skipif(sys.platform != "linux", reason="ended by a signal of Linux's")
+def test_a_worker_amid_a_kernel_ends_with_its_killed_command(tmp_path: Path) -> None:
+    """The kernel here holds the interpreter for ten minutes: no thread of the worker has its turn."""
+    mark = tmp_path / "worker"
+    code = f"""
+from pathlib import Path
+from cluster_functions import held_interpreter
+from cagefield.cluster.tasks import Task, run_tasks
+if __name__ == "__main__":
+    list(run_tasks(1, {{"kernel": Task(held_interpreter, (Path({str(mark)!r}),))}}, device="cpu"))
+"""
+    script = tmp_path / "command.py"
+    script.write_text(code, encoding="utf-8")
+    paths = [str(Path(__file__).parent), *sys.path]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+    with subprocess.Popen([sys.executable, script], env=environment) as command:
+        while not mark.exists():
+            assert command.poll() is None
+            time.sleep(0.1)
+        worker = Path("/proc") / mark.read_text(encoding="ascii")
+        assert worker.exists()
+        command.kill()
+    begun = time.monotonic()
+    while worker.exists() and worker.joinpath("stat").read_text().rpartition(")")[2].split()[0] != "Z":
+        assert time.monotonic() - begun < 300.0
+        time.sleep(0.1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import pickle
 import stat
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 from benchmarks.common.tables import write_texts
 
 from cagefield import Scene, datasets
+from cagefield.errors import line_of
 from cagefield.files.atomic import check_writable, replaced_file
 from cagefield.formats.splats.splat_files import write_splats
 from cagefield.images.image_files import video_writer
@@ -300,3 +302,14 @@ def test_a_place_that_is_none_is_named_and_not_what_is_hidden_there(tmp_path: Pa
     with pytest.raises(OSError) as told, replaced_file(tmp_path / "file" / "x.png", parents=False):
         raise AssertionError
     assert "part-" not in str(told.value) and "x.png" in str(told.value)
+
+
+@pytest.mark.parametrize(
+    "error", [OSError("6144 requested and 2016 written"), OSError(errno.ENOSPC, "No space left on device")]
+)
+def test_a_worker_names_the_place_too(tmp_path: Path, error: OSError) -> None:
+    """NumPy's error has words alone; from another process it comes as what pickle keeps of it."""
+    with pytest.raises(OSError) as told, replaced_file(tmp_path / "x.npy"):
+        raise error
+    for one in (told.value, pickle.loads(pickle.dumps(told.value))):
+        assert line_of(one) == f"{tmp_path / 'x.npy'}: {error.args[-1]}"

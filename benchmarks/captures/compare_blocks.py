@@ -68,6 +68,8 @@ def main() -> None:
                 with multiprocessing.get_context("spawn").Pool(options.processes, maxtasksperchild=1) as pool:
                     jobs = [(options, count, stage, number) for number in range(size)]
                     pool.starmap(train_one, jobs, chunksize=1)
+                    pool.close()
+                    pool.join()  # terminated, pycolmap's handler prints a stack trace
             kept.write_text(measure(options, count) + "\n", encoding="utf-8")
         rows.append(kept.read_text(encoding="utf-8").rstrip("\n"))
         print(rows[-1], flush=True)

@@ -98,6 +98,15 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
     "render, a folder": DiskCommand(
         "render {s}/voxels -o {out} --turntable 3 --size 96 --depth", "r", keeps=True
     ),
+    **(
+        {
+            "render, a cluster": DiskCommand(
+                "render {s}/voxels -o {out} --turntable 3 --size 96 --depth --cluster 2", "r", keeps=True
+            )
+        }
+        if importlib.util.find_spec("distributed") is not None
+        else {}
+    ),
     "render, a video": DiskCommand("render {s}/voxels -o {out} --turntable 6 --size 240", "r.mp4"),
     "edit -o": DiskCommand("edit {s}/voxels {s}/e.yaml -o {out}", "new"),
     "edit -o, splats": DiskCommand("edit {s}/splats {s}/e.yaml -o {out}", "new"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import shutil
 import subprocess
 import sys
@@ -237,6 +238,13 @@ def _render(folder: Path, say: Say) -> None:
     say(1)
 
 
+def _render_on_a_cluster(folder: Path, say: Say) -> None:
+    """Pictures of two local workers, which write them."""
+    words = ("--turntable", "3", "--size", "32", "--overwrite", "--cluster", "2")
+    cli("render", folder / "scene", "-o", folder / "out", *words)
+    say(1)
+
+
 def _render_video(folder: Path, say: Say) -> None:
     arguments = ("--turntable", "6", "--size", "96", "--overwrite")
     cli("render", folder / "scene", "-o", folder / "out.mp4", *arguments)
@@ -346,6 +354,11 @@ SLOW_COMMANDS: dict[str, Command] = {
     "changes and saves, free-form": Command(put_free_form, _free_form_session, _free_form_session_problem),
     "train": Command(_make_photos, _train, trained_problem),
     "render, pictures": Command(_make_pictures, _render, pictures_problem),
+    **(
+        {"render, a cluster": Command(_make_pictures, _render_on_a_cluster, pictures_problem)}
+        if importlib.util.find_spec("distributed") is not None
+        else {}
+    ),
     "render .mp4": Command(put_scene, _render_video, video_problem),
     "bake": Command(put_splats, _bake, trained_problem),
     "export --as mesh": Command(put_scene, _mesh, glb_problem("mesh.glb")),

@@ -65,6 +65,7 @@ class ImportField:
         check_destination(self.out, self.overwrite)
         if self.fov_deg is not None and not 1.0 <= self.fov_deg <= 170.0:
             raise CagefieldError(f"--fov-deg is {self.fov_deg}; it must be from 1 to 170")
+        self._check_file()
         if not is_instant_ngp(self.file) and holds_splats(self.file):
             scene, lines = self._splats()
         else:
@@ -72,6 +73,21 @@ class ImportField:
         scene.save(self.out, overwrite=self.overwrite)
         print(f"{lines}\nscene written to {self.out}", flush=True)
         prepare_light(self.out)
+
+    def _check_file(self) -> None:
+        """Raises CagefieldError for a config, and for a folder without splats, naming a checkpoint in it."""
+        from cagefield.formats.splats.detection import is_splat_folder
+
+        if self.file.suffix.lower() in (".yml", ".yaml"):
+            raise CagefieldError(f"{self.file}: a config; give the checkpoint of its training, step-*.ckpt")
+        if self.file.is_dir() and not is_splat_folder(self.file):
+            patterns = ("step-*.ckpt", "*/step-*.ckpt", "*.th", "*.tar", "*_model.pt", "*.ingp", "ckpt.npz")
+            found = [path for pattern in patterns for path in sorted(self.file.glob(pattern))[-1:]]
+            named = f", such as {found[0]}" if found else ""
+            raise CagefieldError(
+                f"{self.file}: a folder without meta.json or lod-meta.json; give a file of splats or a "
+                f"checkpoint{named}"
+            )
 
     def _splats(self) -> tuple[Scene, str]:
         """The scene of a splat file, and a text report of its contents."""

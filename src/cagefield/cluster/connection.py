@@ -13,11 +13,18 @@ import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from cagefield.cluster.patience import Patience
+from cagefield.cluster.scheduler_address import (
+    announced_wait,
+    call_within,
+    read_scheduler_file,
+    wait_for_listener,
+)
 from cagefield.errors import CagefieldError
 from cagefield.files.temporary_folders import TemporaryFolder
 
@@ -98,6 +105,8 @@ def connect(cluster: int | str, tls: TlsFiles | None = None) -> Iterator[Client]
     LostClusterError for a cluster without workers (`patience`).
     """
     check_installed()
+    if isinstance(cluster, str) and cluster.endswith(".json"):
+        cluster = read_scheduler_file(Path(cluster))
     if isinstance(cluster, str) and cluster.startswith("tls://") and tls is None:
         raise CagefieldError(f"--cluster {cluster} needs certificates; give --cluster-tls CA CERT KEY")
     if isinstance(cluster, str) and cluster.startswith("tcp://"):
@@ -118,9 +127,9 @@ def connect(cluster: int | str, tls: TlsFiles | None = None) -> Iterator[Client]
             target = None
         client = opened.enter_context(_client(cluster, target, security))
         if target is not None:
-            from cagefield.cluster.worker_plugin import InterruptPlugin
+            from cagefield.cluster.worker_plugin import LocalWorkerPlugin
 
-            client.register_plugin(InterruptPlugin())
+            client.register_plugin(LocalWorkerPlugin())
         yield client
 
 
@@ -173,17 +182,13 @@ def _local_workers(count: int, security: Security | None) -> Iterator[LocalClust
 def _client(cluster: int | str, local: Any, security: Security | None) -> Iterator[Client]:
     from distributed import Client
 
-    seconds = CONNECT_SECONDS if local is None else LOCAL_CONNECT_SECONDS
-    options: dict[str, Any] = {"timeout": seconds, "security": security, "set_as_default": False}
+    options: dict[str, Any] = {"security": security, "set_as_default": False}
     try:
-        if local is not None:
-            client = Client(local, **options)
-        elif isinstance(cluster, str) and cluster.endswith(".json"):
-            if not Path(cluster).is_file():
-                raise CagefieldError(f"--cluster: there is no scheduler file {cluster}; give its path")
-            client = Client(scheduler_file=cluster, **options)
+        if isinstance(cluster, str):
+            with announced_wait(cluster, CONNECT_SECONDS):
+                client = call_within(CONNECT_SECONDS, partial(_client_of_scheduler, cluster, options))
         else:
-            client = Client(cluster, **options)
+            client = Client(local, timeout=LOCAL_CONNECT_SECONDS, **options)
     except (OSError, TypeError) as error:
         reason = " ".join(str(error).split())[:200]
         raise CagefieldError(f"no scheduler replies at {cluster} ({reason}); check address and TLS") from None
@@ -193,6 +198,13 @@ def _client(cluster: int | str, local: Any, security: Security | None) -> Iterat
     finally:
         with suppress(TimeoutError, asyncio.TimeoutError, OSError):  # of a scheduler that is gone
             client.close(CLOSE_SECONDS)
+
+
+def _client_of_scheduler(address: str, options: dict[str, Any]) -> Client:
+    from distributed import Client
+
+    wait_for_listener(address, CONNECT_SECONDS)
+    return Client(address, timeout=CONNECT_SECONDS, **options)
 
 
 def _is_loopback(host: str) -> bool:

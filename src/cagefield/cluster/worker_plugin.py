@@ -9,6 +9,7 @@ from distributed import WorkerPlugin
 from distributed.worker import Worker
 
 from cagefield.cluster.scene_archive import SceneArchive
+from cagefield.compute.parent_watch import end_with_parent
 
 
 class ArchivePlugin(WorkerPlugin):  # type: ignore[misc]
@@ -26,12 +27,17 @@ class ArchivePlugin(WorkerPlugin):  # type: ignore[misc]
         self.archive.teardown()
 
 
-class InterruptPlugin(WorkerPlugin):  # type: ignore[misc]
-    """Ctrl+C left to the command, which ends its local workers: a terminal sends it to all of them."""
+class LocalWorkerPlugin(WorkerPlugin):  # type: ignore[misc]
+    """Local workers that end with their command, by it or, where it is killed, by the system.
 
-    name = "cagefield-interrupts"
+    dask's own watch over the parent is a thread, which waits while a kernel holds the interpreter. Ctrl+C is
+    left to the command, which ends its workers: a terminal sends it to all of them.
+    """
+
+    name = "cagefield-local-workers"
 
     def setup(self, worker: Worker) -> None:
-        """Ignores SIGINT in the worker's process."""
+        """Binds the worker's process to its parent, and ignores SIGINT in it."""
+        end_with_parent()
         with contextlib.suppress(ValueError):  # not the main thread
             signal.signal(signal.SIGINT, signal.SIG_IGN)

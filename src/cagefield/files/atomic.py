@@ -75,6 +75,7 @@ def _naming(path: Path, hidden: Path) -> Iterator[None]:
             error.filename, error.filename2 = str(path), None
             if error.errno is None:  # pillow's, which has words alone
                 error.errno, error.strerror = errno.EIO, str(error.args[0]) if error.args else "failed"
+                error.args = (error.errno, error.strerror)  # else pickle loses the names
         raise
 
 

@@ -45,7 +45,10 @@ def read_scene(folder: Path, whole: bool) -> dict[str, Any]:
     recover(folder)
     if not folder.is_dir():
         state = "is a file, not a folder" if folder.exists() else "does not exist"
-        raise SceneError(f"scene {folder} {state}; give the folder that `cagefield train -o` wrote")
+        raise SceneError(
+            f"scene {folder} {state}; give the folder that `cagefield train -o` or `cagefield import -o` "
+            "wrote"
+        )
     manifest = read_manifest(folder)
     for name in (FIELD, CAMERAS, EDITS):
         check_part(folder / name)

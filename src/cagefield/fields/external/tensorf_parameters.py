@@ -102,7 +102,10 @@ class TensorfParameters:
 
     def _check_options(self, fix: Any) -> None:
         if self.shading not in SHADINGS:
-            raise FieldError(f"shadingMode is {self.shading!r:.40}; expected one of {', '.join(SHADINGS)}")
+            raise FieldError(
+                f"shadingMode is {self.shading!r:.40}; expected one of {', '.join(SHADINGS)}: train with one "
+                "of them, or the photos here: cagefield train PHOTOS -o SCENE"
+            )
         if self.activation not in ACTIVATIONS:
             raise FieldError(f"fea2denseAct is {self.activation!r:.40}; expected softplus or relu")
         fix("density_shift", number("density_shift", self.density_shift, -1e4, 1e4))

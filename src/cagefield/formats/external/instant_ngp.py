@@ -33,7 +33,7 @@ from cagefield.fields.external.instant_ngp_parameters import CASCADE_BYTES, DIRE
 from cagefield.files import msgpack
 from cagefield.files.memory import memory_shortage
 from cagefield.files.safe_open import UnreadableError, check_regular, open_regular
-from cagefield.formats.external.checkpoint import ExternalCheckpoint
+from cagefield.formats.external.checkpoint import ExternalCheckpoint, format_names
 from cagefield.formats.external.tcnn_parameters import FlatParameters, padded
 
 SUFFIXES = (".ingp", ".msgpack")
@@ -71,10 +71,14 @@ def read_instant_ngp(path: Path) -> ExternalCheckpoint:
             do not fit the config.
     """
     config = _mapping("the snapshot", _unpacked(path))
-    snapshot = _mapping("snapshot", config.get("snapshot"))
+    if "snapshot" not in config:
+        raise FieldError(f"it holds {format_names(config)}, no snapshot; save one in Instant-NGP")
+    snapshot = _mapping("snapshot", config["snapshot"])
     mode = str(snapshot.get("mode", "nerf")).lower()
     if mode != "nerf" or "nerf" not in snapshot:
-        raise FieldError(f"a snapshot of Instant-NGP in mode {mode:.20}; only NeRFs are read")
+        raise FieldError(
+            f"a snapshot of Instant-NGP in mode {mode:.20}; only NeRFs are read, save a snapshot of one"
+        )
     if whole_number("version", snapshot.get("version", 0), 0, 1 << 30) < 1:
         raise FieldError("a snapshot of an old version of Instant-NGP; save it again with a newer one")
     nerf = _mapping("nerf", snapshot["nerf"])
@@ -157,7 +161,9 @@ def _networks(
     """(density network over its hash grid, color network) of the flat parameters."""
     encoding = _mapping("encoding", config.get("encoding"))
     if _name(encoding, "otype") not in ("hashgrid", "grid") or _name(encoding, "type", "hash") != "hash":
-        raise FieldError(f"encoding is {_name(encoding, 'otype')!r:.40}; only HashGrid is read")
+        raise FieldError(
+            f"encoding is {_name(encoding, 'otype')!r:.40}; only HashGrid is read, train with base.json"
+        )
     if _name(encoding, "interpolation", "linear") != "linear":
         raise FieldError(f"interpolation is {_name(encoding, 'interpolation')!r:.40}; only Linear is read")
     if _name(encoding, "hash", "coherentprime") != "coherentprime":

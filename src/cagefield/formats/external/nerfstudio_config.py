@@ -41,7 +41,7 @@ def read_config(path: Path) -> dict[str, Any]:
     try:
         root = yaml_text.compose(read_text(path))
     except (OSError, UnicodeDecodeError, yaml_text.YamlError) as error:
-        reason = " ".join(str(error).split())[:120]
+        reason = " ".join(str(getattr(error, "strerror", None) or error).split())[:120]
         raise FieldError(f"{path}: not a readable config ({reason}); {_CURE}") from None
     if not isinstance(root, yaml.MappingNode):
         raise FieldError(f"{path}: no config of nerfstudio, its content is no mapping; {_CURE}")

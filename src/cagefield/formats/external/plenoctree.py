@@ -80,7 +80,9 @@ def _terms(arrays: dict[str, NDArray[Any]], shape: tuple[int, ...]) -> int:
         return 0
     match = re.fullmatch(r"SH(\d{1,2})", text)
     if match is None:
-        raise FieldError(f"data_format is {text!r:.40}; only RGBA and SH1 to SH25 are read")
+        raise FieldError(
+            f"data_format is {text!r:.40}; only RGBA and SH1 to SH25 are read, extract such an octree"
+        )
     return int(match.group(1))
 
 

@@ -19,6 +19,7 @@ from cagefield.formats.external.plenoctree import is_plenoctree, read_plenoctree
 from cagefield.formats.external.svox2 import is_svox2, read_svox2
 from cagefield.formats.external.svraster import is_svraster, read_svraster
 from cagefield.formats.external.tensorf import is_tensorf, read_tensorf
+from cagefield.formats.nerf.nerf_pytorch import KRRISH94, YENCHENLIN
 from cagefield.formats.torch_files import read_torch_tensors
 
 Headers = dict[str, tuple[tuple[int, ...], np.dtype[Any]]]
@@ -37,12 +38,12 @@ _NPZ: tuple[tuple[Callable[[Headers], bool], Callable[[Path, Headers], ExternalC
 
 
 def read_external(path: Path | str, config: Path | None = None) -> ExternalCheckpoint | None:
-    """Field of another program's checkpoint; None for a PyTorch file of none of them, as nerf-pytorch's.
+    """Field of another program's checkpoint; None for nerf-pytorch's.
 
     Raises:
-        FieldError: a config for another checkpoint than nerfacto's, missing or damaged file, objects
-            beside tensors and plain values (which are not unpickled), missing or misshapen tensors, missing
-            PyTorch.
+        FieldError: a checkpoint of another program, a config for another checkpoint than nerfacto's, missing
+            or damaged file, objects beside tensors and plain values (which are not unpickled), missing or
+            misshapen tensors, missing PyTorch.
     """
     path = Path(path)
     if not os.path.exists(path):  # also where the name is too long for a file
@@ -61,10 +62,21 @@ def read_external(path: Path | str, config: Path | None = None) -> ExternalCheck
             if test(content):
                 _check_no_config(config)
                 return reader(content)
+        if not any(name in content for name in (YENCHENLIN[0], KRRISH94[0])):
+            raise FieldError(_unknown(content))
     except FieldError as error:
         message = str(error)
         raise FieldError(message if message.startswith(str(path)) else f"{path}: {message}") from None
     return None
+
+
+def _unknown(content: Mapping[str, Any]) -> str:
+    if "pipeline" in content:
+        return "a checkpoint of nerfstudio, of another model than nerfacto and splatfacto; train one of these"
+    return (
+        f"a checkpoint of no program that is read: it holds {format_names(content)}; these are nerf-pytorch, "
+        "TensoRF, nerfacto, splatfacto, SVRaster, Instant-NGP, svox2 and svox"
+    )
 
 
 def _check_no_config(config: Path | None) -> None:

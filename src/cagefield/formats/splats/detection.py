@@ -18,8 +18,12 @@ from cagefield.files.safe_open import open_regular, read_bytes
 META, LOD_META = "meta.json", "lod-meta.json"
 
 EMPTY_FILE = "an empty file"
+GZIP_ARCHIVE = "a gzip archive of something else than SPZ; unpack it"
 ZIP_ARCHIVE = "a zip archive without meta.json; unpack it"
 """Description of another zip archive; PyTorch checkpoints are such archives too."""
+
+CHECKPOINT_SUFFIXES = (".th", ".pt", ".pth", ".tar", ".npz", ".ingp", ".msgpack")
+"""Suffixes of radiance fields of other programs, which `cagefield import` reads."""
 
 _START_BYTES = 4096
 _MAX_JSON_BYTES = 64 << 20
@@ -84,7 +88,7 @@ def describe_other_file(path: Path) -> str | None:
     if result is None and not start:
         return EMPTY_FILE
     if result is None and start.startswith(b"\x1f\x8b"):
-        return "a gzip archive of something else than SPZ; unpack it"
+        return GZIP_ARCHIVE
     if result is None and start.startswith(b"PK\x03\x04"):
         return ZIP_ARCHIVE
     if result is None and is_text(start):

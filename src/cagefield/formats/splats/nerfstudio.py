@@ -36,7 +36,10 @@ def open_splatfacto(path: Path) -> SplatSource:
     found = {name: tensor for name in _NAMES if (tensor := _tensor(pipeline, name)) is not None}
     missing = [name for name in _NAMES[:5] if name not in found]
     if missing:
-        raise FieldError(f"{path}: no checkpoint of splatfacto, it lacks {', '.join(missing)}")
+        raise FieldError(
+            f"{path}: no checkpoint of splatfacto, it lacks {', '.join(missing)}; of nerfacto's "
+            "`cagefield import` makes a scene, other models of nerfstudio are not read"
+        )
     means, scales, quats, opacities, dc = (found[name] for name in _NAMES[:5])
     count = len(means)
     rest = found.get("features_rest", np.zeros((count, 0, 3), np.float32))

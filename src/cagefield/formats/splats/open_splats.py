@@ -26,7 +26,9 @@ from cagefield.files.safe_open import check_regular
 from cagefield.formats.splats.antimatter15_splat import open_splat_rows
 from cagefield.formats.splats.compressed_ply import open_compressed_ply
 from cagefield.formats.splats.detection import (
+    CHECKPOINT_SUFFIXES,
     EMPTY_FILE,
+    GZIP_ARCHIVE,
     LOD_META,
     META,
     ZIP_ARCHIVE,
@@ -177,5 +179,9 @@ def _open_by_suffix(path: Path, ending: str) -> SplatSource:
         return _OPEN[ending](path)  # the reader reports the problem
     if kind == EMPTY_FILE:
         raise FieldError(f"{path}: {kind}; copy it again")
+    if kind in (None, ZIP_ARCHIVE, GZIP_ARCHIVE) and path.suffix.lower() in CHECKPOINT_SUFFIXES:
+        raise FieldError(
+            f"{path}: no splats; of a checkpoint `cagefield import {path} -o SCENE` makes a scene"
+        )
     of = f" ({kind})" if kind else ""
     raise FieldError(f"{path}: no format of splats that is known{of}; these are: {', '.join(READABLE)}")

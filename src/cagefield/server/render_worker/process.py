@@ -21,9 +21,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cagefield.compute.parent_watch import end_with_parent
 from cagefield.errors import CagefieldError, line_of, warnings_in_one_line
 from cagefield.files.temporary_folders import TemporaryFolder
-from cagefield.server.render_worker.parent_watch import end_with_parent
 from cagefield.server.render_worker.tasks import Failed, Ready, Replaced, Result, Task
 from cagefield.server.render_worker.unused_memory import UnusedMemory
 

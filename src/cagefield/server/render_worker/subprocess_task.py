@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
+from cagefield.compute.parent_watch import end_with_parent
 from cagefield.errors import CagefieldError, line_of, warnings_in_one_line
-from cagefield.server.render_worker.parent_watch import end_with_parent
 
 
 @dataclass(frozen=True)
