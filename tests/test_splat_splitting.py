@@ -35,7 +35,7 @@ BENDS = {
     "lattice": Edit.continuous(
         Cage.box((0.15, 0, 0), (0.6, 0.6, 1.4)).subdivided((1, 1, 4)), Cage.box((0.3, 0, 0), (2.6, 2.2, 3.4))
     ).bend("z", np.radians(70)),
-    "points": Edit.points([[0.15, 0, 0.1]], radius=0.6).move_point(0, (0.45, 0, 0)),
+    "points": Edit.points([[0.15, 0, 0.1]], radius=0.9).move_point(0, (0.45, 0, 0)),
     "mesh": Edit.continuous(
         MeshCage.of_box(Cage.box((0, 0, 0.9), (0.8, 0.8, 0.4))), Cage.box((0, 0, 0.2), (1.8, 1.8, 2.2))
     ).rotate((0, 0, np.radians(120))),
@@ -65,16 +65,7 @@ def covariances(field: SplatField) -> np.ndarray:
     return R @ (np.exp(2.0 * field.log_scales.astype(np.float64))[:, :, None] * R.transpose(0, 2, 1))
 
 
-AT_REST = nightly_except([name for name in BENDS if name != "points"], "stretch", "twist", "bend")
-AT_REST.append(
-    pytest.param(
-        "points",
-        marks=[pytest.mark.nightly, pytest.mark.xfail(reason="32.7 dB at rest, not understood", strict=True)],
-    )
-)
-
-
-@pytest.mark.parametrize("name", AT_REST)
+@pytest.mark.parametrize("name", NAMES)
 def test_what_is_split_looks_the_same_at_rest(name: str) -> None:
     field = rod()
     split = split_for_edits(field, EditStack([BENDS[name]])).field
