@@ -11,8 +11,10 @@ from cagefield.edits import Edit, EditStack, PreparedStack, dump_edits, parse_ed
 from cagefield.edits.chains import ancestors, application_order
 from cagefield.edits.partial_edit import partial_edit
 from cagefield.errors import EditError, EditFileError
+from cagefield.geometry import MeshCage
 from cagefield.geometry.cage import Cage
 from cagefield.pages.path_states import in_application_order
+from tiers import nightly_after_first
 
 TURN = Rotation.from_euler("XYZ", (20, 30, 40), degrees=True)
 SHIFT = np.array([0.3, -0.2, 0.5])
@@ -28,6 +30,11 @@ BODY = Edit.continuous(Cage.box((0.3, 0, 0.4), 0.6), Cage.box((0.3, 0, 0.4), 1.6
 )
 LATTICE = Edit.continuous(ARM_CAGE.subdivided((4, 1, 1)), ARM_CAGE.grown(1.4), name="arm").bend("x", 0.9)
 POINTS = Edit.points([[0.6, 0, 0]], radius=0.7, name="arm").translate((0.1, 0.2, 0))
+MESH = (
+    Edit.continuous(MeshCage.of_box(ARM_CAGE), ARM_CAGE.grown(1.4), name="arm")
+    .twist("x", 0.8)
+    .move_point(7, (0.2, 0.1, 0.1))
+)
 
 
 def inside(edit: Edit, count: int = 300) -> np.ndarray:
@@ -36,7 +43,16 @@ def inside(edit: Edit, count: int = 300) -> np.ndarray:
     return np.random.default_rng(5).uniform(low, high, (count, 3))
 
 
-@pytest.mark.parametrize("parent", [ARM, LATTICE, POINTS, Edit.move(ARM_CAGE, name="arm").rotate(TURN)])
+@pytest.mark.parametrize(
+    "parent",
+    [
+        ARM,
+        LATTICE,
+        POINTS,
+        pytest.param(MESH, marks=pytest.mark.nightly),
+        Edit.move(ARM_CAGE, name="arm").rotate(TURN),
+    ],
+)
 @pytest.mark.parametrize("is_child_first", [True, False])
 def test_a_child_acts_first_and_its_parent_carries_it(parent: Edit, is_child_first: bool) -> None:
     stack = EditStack([FINGER, parent] if is_child_first else [parent, FINGER])
@@ -141,10 +157,11 @@ def test_parents_in_python_and_in_files() -> None:
     ].parent
 
 
-def test_keyframes_move_parent_and_child() -> None:
+@pytest.mark.parametrize("parent", nightly_after_first([ARM, LATTICE, POINTS, MESH]))
+def test_keyframes_move_parent_and_child(parent: Edit) -> None:
     # At half of both, as a camera path shows it: halves of the operations, still a chain.
-    half = PreparedStack(partial_edit(edit, 0.5) for edit in EditStack([ARM, FINGER]).resolved)
-    own, arm = (partial_edit(edit, 0.5) for edit in (FINGER.without_parent, ARM))
+    half = PreparedStack(partial_edit(edit, 0.5) for edit in EditStack([parent, FINGER]).resolved)
+    own, arm = (partial_edit(edit, 0.5) for edit in (FINGER.without_parent, parent))
     p = inside(FINGER)
     np.testing.assert_allclose(
         half.to_deformed(p).points, arm.exact_warp.to_deformed(own.exact_warp.to_deformed(p).points).points

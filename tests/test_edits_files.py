@@ -205,6 +205,14 @@ def test_edits_that_cannot_be_evaluated_are_errors_unless_asked_for(tmp_path: Pa
             ("{center: [0, 0, 0], size: 1}", "{corners: [[0, 0, 0]]}"),
             "inner.corners: expected 8 items, got 1",
         ),
+        (
+            ("{center: [0, 0, 0], size: 1}", "{points: [[0, 0, 0]], radius: .nan}"),
+            "line 3: edits.0..inner.radius: numbers must be finite, got nan",
+        ),
+        (
+            ("size: 1}", "size: 1, lattice: {points: [2, 2, 2], control_points: []}}"),
+            "line 3: edits.0..inner.lattice.control_points: expected 8 items, got 0",
+        ),
         (("margin: 1", "margin: 0"), "line 4: edits.0..outer.margin: must be positive, got 0"),
         (("    outer: {margin: 1}\n", ""), "line 2: edits.0.: .*a continuous edit needs an outer cage"),
         (("    inner: {center: [0, 0, 0], size: 1}\n", ""), '"inner" is missing'),
@@ -265,6 +273,7 @@ def test_errors_name_the_line_the_key_and_the_cure(change: tuple[str, str], mess
     with pytest.raises(EditFileError, match=message) as caught:
         parse_edits(ONE.replace(*change), source="arm.yaml")
     assert str(caught.value).startswith("arm.yaml, line ") and "\n" not in str(caught.value)
+    assert str(caught.value).count("arm.yaml") == 1
     parse_edits(ONE)
 
 

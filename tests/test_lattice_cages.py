@@ -227,6 +227,8 @@ def test_bad_input_says_the_cure() -> None:
         ARM.move_points((1,), (0, 0, 0.1), radius=1.0, falloff="soft")
     with pytest.raises(CageError, match="must be finite"):
         ARM.move_point(3, (0, np.nan, 0))
+    with pytest.raises(CageError, match="bend angle must be finite, got nan"):
+        ARM.bend("z", np.float64("nan"))
     with pytest.raises(CageError, match="axis must be x, y or z"):
         ARM.bend("w", 1.0)
     with pytest.raises(CageError, match="goes towards another axis than z"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -64,7 +65,7 @@ def test_damaged_files_end_in_one_line(tmp_path: Path) -> None:
     refused("none.obj", None, "cannot be read")
     refused("empty.obj", b"", "no mesh in it can be read|0 triangles")
     refused("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no mesh in it can be read|0 triangles")
-    refused("nan.obj", whole["obj"].replace(b"v 0", b"v nan", 1), "must be finite|can be read|is open")
+    refused("nan.obj", re.sub(rb"(?m)^v \S+", b"v nan", whole["obj"], count=1), "must be finite")
     refused(
         "open.obj",
         whole["obj"].rsplit(b"\nf ", 1)[0],

@@ -101,3 +101,4 @@ def test_a_run_goes_on_where_its_log_ends(tmp_path: Path) -> None:
     todo = list(tasks(3 * len(kinds), 6, rows))
     assert len(todo) == 3 * len(kinds) - 2 and ("box", 1, 6) in todo and ("box", 2, 6) not in todo
     assert [kind for kind, _, _ in todo[: len(kinds) - 1]] == kinds[1:]
+    assert list(tasks(3 * len(kinds), 6, rows, last_first=True)) == todo[::-1]

@@ -190,11 +190,15 @@ def run_compiled(task: tuple[str, int, int]) -> Promises:
 
 
 def tasks(
-    edits: int, points: int, done: Iterable[Promises], kinds: Collection[str] = tuple(KINDS)
+    edits: int,
+    points: int,
+    done: Iterable[Promises],
+    kinds: Collection[str] = tuple(KINDS),
+    last_first: bool = False,
 ) -> Iterator[tuple[str, int, int]]:
     """The tasks of so many edits whose kinds take turns, of these kinds; those that are done are left out."""
     known = {(each.kind, each.number) for each in done}
-    for n in range(edits):
+    for n in reversed(range(edits)) if last_first else range(edits):
         kind, number = list(KINDS)[n % len(KINDS)], n // len(KINDS)
         if kind in kinds and (kind, number) not in known:
             yield kind, number, points
@@ -263,12 +267,13 @@ def main() -> None:
     parser.add_argument("--edits", type=int, default=10_000, help="number of random edits")
     parser.add_argument("--points", type=int, default=24, help="points of each sort per edit")
     parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
+    parser.add_argument("--last-first", action="store_true", help="begin with the last edits")
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--log", type=Path, help="file of finished edits, from which a run goes on")
     parser.add_argument("--out", type=Path, help="Markdown file for the table")
     options = parser.parse_args()
     rows = [] if options.log is None else read_log(options.log)
-    todo = list(tasks(options.edits, options.points, rows, options.kinds))
+    todo = list(tasks(options.edits, options.points, rows, options.kinds, options.last_first))
     with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
         for row in pool.imap_unordered(run_compiled, todo):
             rows.append(row)

@@ -46,6 +46,8 @@ def _lattice(node: Node) -> LatticeCage:
             return box.subdivided([count - 1 for count in shape], interpolation)
         points = [point.vector() for point in keys["control_points"].items(int(np.prod(shape)))]
         return LatticeCage(np.array(points), shape, interpolation, pivot=box.pivot)
+    except EditFileError:
+        raise
     except CagefieldError as error:
         raise lattice.error(str(error)) from None
 
@@ -85,10 +87,9 @@ def _control_points(node: Node) -> ControlPoints:
     linear = [row.vector() for row in keys["linear"].items(3)] if "linear" in keys else None
     falloff = keys["falloff"].choice(FALLOFF_CURVES) if "falloff" in keys else "smooth"
     connected = "connected" in keys and keys["connected"].boolean()
+    radius = keys["radius"].number()
     try:
-        return ControlPoints(
-            points, keys["radius"].number(), falloff, pivot=pivot, linear=linear, connected=connected
-        )
+        return ControlPoints(points, radius, falloff, pivot=pivot, linear=linear, connected=connected)
     except CagefieldError as error:
         raise node.error(str(error)) from None
 

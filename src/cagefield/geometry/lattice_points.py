@@ -162,5 +162,5 @@ def shares(angle: float) -> list[float]:
 def finite(value: float, name: str) -> float:
     """A finite number, or a `CageError` that names it."""
     if not np.isfinite(value):
-        raise CageError(f"{name} must be finite, got {value!r}")
+        raise CageError(f"{name} must be finite, got {float(value):g}")
     return float(value)

@@ -92,6 +92,8 @@ def _loaded(content: bytes, file: PurePath) -> tuple[Array, Triangles]:
         raise CageError(f"{file}: its triangles name vertices that it has not; export it again")
     if not len(triangles):
         raise CageError(f"{file}: mesh has 0 triangles; give it a closed surface")
+    if not np.isfinite(vertices[triangles]).all():  # else numbers that are none would be vertices apart
+        raise CageError(f"{file}: coordinates of vertices must be finite; export it again")
     used, numbers = np.unique(vertices[triangles].reshape(-1, 3), axis=0, return_inverse=True)
     return _in_order(used, numbers.reshape(-1, 3))
 
