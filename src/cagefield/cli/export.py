@@ -288,7 +288,7 @@ class Export:
 
         with progress_bar("Splats") as move:
             write_splats(
-                splats, self.out, self.axes, lambda done: move(done, 1.0), spz_version=self.spz_version
+                splats, self.out, self.axes, lambda done: move(done, 1.0, ""), spz_version=self.spz_version
             )
         return levels_and_bytes(self.out)[0]
 
