@@ -24,6 +24,7 @@ from cagefield.server.render_worker.edited_splats import EditedSplats, write_edi
 from commands import printed, refused
 from splat_scenes import random_splats
 from test_formats_splats import assert_within, convert_with, splat_transform
+from tiers import nightly_after_first
 
 __all__ = ["splat_transform"]  # the fixture
 
@@ -47,7 +48,7 @@ def written(folder: Path, field: SplatField) -> dict[str, Any]:
     return meta
 
 
-@pytest.mark.parametrize("degree", [0, 3])
+@pytest.mark.parametrize("degree", nightly_after_first([3, 0]))
 def test_the_finest_level_is_the_field_and_the_others_its_decimations(tmp_path: Path, degree: int) -> None:
     field = random_splats(500, degree=degree)
     meta = written(tmp_path / "x", field)
@@ -56,11 +57,11 @@ def test_the_finest_level_is_the_field_and_the_others_its_decimations(tmp_path: 
     parts = leaves(meta["tree"])
     assert len(parts) == 8 and all(len(part["lods"]) == 3 for part in parts)
     rows = leaf_rows(field.means, 100)
+    files = [read_splats(tmp_path / "x" / name).means for name in meta["filenames"]]
     for level in range(1, 3):
         for part, own in zip(parts, rows, strict=True):
             lod = part["lods"][str(level)]
-            file = read_splats(tmp_path / "x" / meta["filenames"][lod["file"]])
-            got = file.means[lod["offset"] : lod["offset"] + lod["count"]]
+            got = files[lod["file"]][lod["offset"] : lod["offset"] + lod["count"]]
             fewer = decimate_splats(field.take(own), 15)
             expected = fewer if level == 1 else decimate_splats(fewer, 3)
             distance, at = cKDTree(expected.means).query(got)
@@ -69,13 +70,13 @@ def test_the_finest_level_is_the_field_and_the_others_its_decimations(tmp_path: 
 
 def test_rows_of_leaves_fill_their_files_and_boxes_hold_them(tmp_path: Path) -> None:
     meta = written(tmp_path / "x", random_splats(500, degree=0))
+    files = [read_splats(tmp_path / "x" / name).means for name in meta["filenames"]]
     filled: dict[int, list[tuple[int, int]]] = {}
     for leaf in leaves(meta["tree"]):
         low, high = (np.array(leaf["bound"][side]) for side in ("min", "max"))
         for lod in leaf["lods"].values():
             filled.setdefault(lod["file"], []).append((lod["offset"], lod["count"]))
-            file = read_splats(tmp_path / "x" / meta["filenames"][lod["file"]])
-            means = file.means[lod["offset"] : lod["offset"] + lod["count"]]
+            means = files[lod["file"]][lod["offset"] : lod["offset"] + lod["count"]]
             assert (means > low).all() and (means < high).all()
     assert len(filled) == len(meta["filenames"]) > 3
     for number, name in enumerate(meta["filenames"]):
@@ -98,6 +99,7 @@ def test_levels_go_down_to_the_coarsest() -> None:
     assert sorted(np.concatenate(leaf_rows(points, 3)).tolist()) == list(range(10))
 
 
+@pytest.mark.nightly
 def test_splat_transform_reads_each_file_of_the_levels(tmp_path: Path, splat_transform: str) -> None:
     field = random_splats(200, degree=3)
     meta = written(tmp_path / "x", field)
@@ -131,7 +133,14 @@ def test_the_commands_write_levels_and_say_so(tmp_path: Path, capsys: pytest.Cap
     assert len(read_splats(out)) == 30
 
 
-def test_folders_of_other_files_are_left_alone(tmp_path: Path) -> None:
+def test_more_splats_than_memory_holds_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sog_lod_writer, "memory_shortage", lambda size: f"{size} bytes are needed")
+    with pytest.raises(FieldError, match=r"levels of 30 splats are too many: 8280 bytes are needed"):
+        write_splats(random_splats(30, degree=1), tmp_path / "x" / "lod-meta.json")
+    assert not (tmp_path / "x").exists()
+
+
+def test_folders_of_other_files_are_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     field = random_splats(30, degree=0)
     (tmp_path / "photos").mkdir()
     (tmp_path / "photos" / "a.jpg").write_text("")
@@ -139,6 +148,9 @@ def test_folders_of_other_files_are_left_alone(tmp_path: Path) -> None:
         write_splats(field, tmp_path / "photos" / "lod-meta.json")
     with pytest.raises(FieldError, match=r"is named lod-meta\.json; give FOLDER/lod-meta\.json"):
         write_splats(field, tmp_path / "new" / "garden-lod-meta.json")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(FieldError, match=r"takes its place as a whole; give NEW_FOLDER/lod-meta\.json"):
+        write_splats(field, "lod-meta.json")
     assert [path.name for path in tmp_path.rglob("*")] == ["photos", "a.jpg"]
 
 

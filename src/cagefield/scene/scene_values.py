@@ -44,8 +44,12 @@ def read_scene(folder: Path, whole: bool) -> dict[str, Any]:
     """
     recover(folder)
     if not folder.is_dir():
-        state = "is a file, not a folder" if folder.exists() else "does not exist"
-        raise SceneError(f"scene {folder} {state}; give the folder that `cagefield train -o` wrote")
+        if folder.exists():
+            raise SceneError(
+                f"scene {folder} is a file, not a folder; give the folder that `cagefield train -o` wrote, "
+                "or `cagefield import -o` of a file of splats"
+            )
+        raise SceneError(f"scene {folder} does not exist; give the folder that `cagefield train -o` wrote")
     manifest = read_manifest(folder)
     for name in (FIELD, CAMERAS, EDITS):
         check_part(folder / name)

@@ -23,6 +23,7 @@ from cagefield.errors import FieldError
 from cagefield.fields.splat_decimation import decimate_splats
 from cagefield.fields.splat_field import SplatField
 from cagefield.files.atomic import recover_folder, replaced_folder
+from cagefield.files.memory import memory_shortage
 from cagefield.files.safe_open import real_path
 from cagefield.formats.splats.detection import LOD_META, META
 from cagefield.formats.splats.sog_writer import sog_files
@@ -41,6 +42,9 @@ COARSE_SPLATS = 60_000
 
 LEVEL_FACTOR = 4
 """Ratio of the numbers of splats of two levels: half the spacing on a surface."""
+
+COPIES = 3
+"""Copies of all splats in memory: the field, its levels and a file."""
 
 _COLUMNS = ("means", "log_scales", "quaternions", "opacities", "sh")
 
@@ -69,11 +73,16 @@ def check_sog_lod(path: Path) -> None:
     """Passes where a streamed SOG may be written: `path` is a lod-meta.json in a folder of its own.
 
     Raises:
-        FieldError: another name, or a folder that has other files and no streamed SOG.
+        FieldError: another name, the working folder, or a folder with other files and no streamed SOG.
     """
     if path.name != LOD_META:
         raise FieldError(f"{path}: the file of a streamed SOG is named {LOD_META}; give FOLDER/{LOD_META}")
     folder = real_path(path.parent)
+    if folder == real_path(Path()):
+        raise FieldError(
+            f"{path}: a streamed SOG is a folder of files, which takes its place as a whole; "
+            f"give NEW_FOLDER/{LOD_META}"
+        )
     recover_folder(folder, lambda left: (left / LOD_META).is_file())
     if folder.is_dir() and any(folder.iterdir()) and not (folder / LOD_META).is_file():
         raise FieldError(
@@ -89,9 +98,12 @@ def write_sog_lod(path: Path, table: SplatTable, on_progress: OnProgress = lambd
     in memory.
 
     Raises:
-        FieldError: as `check_sog_lod`.
+        FieldError: as `check_sog_lod`, or more splats than memory holds.
     """
     check_sog_lod(path)
+    floats = 11 + 3 * (table.sh_degree + 1) ** 2
+    if (lacking := memory_shortage(4 * floats * COPIES * table.count)) is not None:
+        raise FieldError(f"{path}: levels of {table.count} splats are too many: {lacking}")
     splats = _field_of(table)
     files: list[_File] = []
     leaves = leaf_rows(splats.means, LEAF_SPLATS)
