@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -82,6 +83,19 @@ def test_the_edited_splats_download_with_the_edits_in_them(editor: EditorPage, f
     assert expected[:, 0].mean() > 0.05
     np.testing.assert_allclose(np.sort(means, axis=0), np.sort(expected, axis=0), atol=1e-6)
     assert [entry.name for entry in folder.iterdir()] == ["ball.ply"]
+
+
+@pytest.mark.nightly
+def test_levels_of_detail_download_as_an_archive(editor: EditorPage, folder: Path) -> None:
+    with editor.page.expect_download() as waiting:
+        editor.page.click(".download")
+        editor.page.select_option("dialog[open] select[name=form]", "lod")
+        editor.page.click("dialog[open] .primary")
+    download = waiting.value
+    assert download.suggested_filename == "ball.lod.zip"
+    download.save_as(folder.parent / "down.zip")
+    zipfile.ZipFile(folder.parent / "down.zip").extractall(folder.parent / "levels")
+    assert len(read_splats(folder.parent / "levels" / "ball")) == len(read_splats(folder / "ball.ply"))
 
 
 def test_saving_a_file_asks_where_to(editor: EditorPage, folder: Path) -> None:

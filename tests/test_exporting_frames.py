@@ -90,6 +90,33 @@ def test_time_samples_are_the_splats_of_each_frame(tmp_path: Path, suffix: str) 
     assert (stage.GetStartTimeCode(), stage.GetEndTimeCode(), stage.GetTimeCodesPerSecond()) == (0, 4, FPS)
 
 
+KINDS = {
+    "continuous": lambda part: Edit.continuous(INNER, INNER.grown(0.4)).translate((0.2 * part, 0, 0)),
+    "lattice": lambda part: Edit.continuous(INNER.subdivided((3, 3, 3)), INNER.grown(0.4)).translate(
+        (0, 0.1 * part, 0)
+    ),
+    "graded": lambda part: Edit.continuous(INNER, INNER.grown(0.4)).grade(
+        exposure=0.8 * part, hue_deg=50 * part, opacity=1 - 0.5 * part
+    ),
+    "mirrored copy": lambda part: (
+        Edit.copy(INNER, fill="none", relight="none").mirror("x").translate((-0.9 * part, 0.2 * part, 0))
+    ),
+}
+"""Edits by kind, as functions of the part that is done, written out without the parts of operations."""
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("degree", [1, 3])
+@pytest.mark.parametrize("kind", KINDS)
+def test_time_samples_of_each_kind_of_edit(tmp_path: Path, kind: str, degree: int) -> None:
+    scene = Scene(random_splats(150, degree), EditStack([KINDS[kind](1.0)]))
+    write_scenes_usd(tmp_path / "x.usdc", [StageScene("x", scene, scene.up)], PATH)
+    for number, still in enumerate(PATH.stills()):
+        edits = EditStack([KINDS[kind](still.parts[1])] if still.parts[1] else [])
+        expected = upright(baked_splats(scene.field, edits), scene.up)
+        assert_close(read_splats(tmp_path / "x.usdc", time_code=float(number)), expected)
+
+
 def test_the_camera_of_the_path_looks_at_the_splats(tmp_path: Path) -> None:
     """USD's own camera projects a splat to the pixel at which the scene's camera sees it."""
     from pxr import UsdGeom

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from cagefield.errors import FieldError
+from cagefield.fields.sh import MAX_DEGREE
 from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats.axes import convert_axes
 from cagefield.formats.splats.splat_files import convert_splats, read_splats, write_splats
@@ -23,6 +24,7 @@ from cagefield.geometry.quaternions import rotation_matrices
 from full_disks import files_up_to
 from scenes import files_of
 from splat_scenes import random_splats
+from tiers import nightly_except
 
 Usd: Any = pytest.importorskip("pxr.Usd", reason="USD is read by usd-core (extra usd)")
 CLIPS = '( clips = { dictionary default = { string primPath = "/a" } } )'
@@ -58,7 +60,7 @@ def splat_prim(name: str = "a", body: str = "", head: str = "") -> str:
 
 
 @pytest.mark.parametrize("suffix", USD_SUFFIXES)
-@pytest.mark.parametrize("degree", [0, 3])
+@pytest.mark.parametrize("degree", nightly_except(range(MAX_DEGREE + 1), 0, 3))
 def test_a_round_trip_keeps_the_splats(tmp_path: Path, suffix: str, degree: int) -> None:
     field = random_splats(300, degree)
     write_splats(field, tmp_path / f"my scene{suffix}")

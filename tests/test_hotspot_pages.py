@@ -15,7 +15,7 @@ from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Keyframe, stills
 from cagefield.pages.scene_page import ScenePage
 from cagefield.scene.alignment import Alignment
-from cagefield.scene.hotspot_tour import between, pose_of
+from cagefield.scene.hotspot_tour import between, pose_of, tour_keys
 from cagefield.scene.hotspots import resolved_view, view_of_camera
 from editor_page import editor_page
 from editor_server import editor_server
@@ -36,6 +36,13 @@ requestAnimationFrame(function record() {
 });
 """
 """Script that keeps the eye of each frame of a flight."""
+
+AT_THE_SECOND_STOP = """
+(keys => cagefield.now.preview !== null
+    && Math.hypot(...[3, 7, 11].map(k => cagefield.camera.c2w[k] - keys[6].c2w[k])) < 0.01
+)(cagefield.now.state.keys)
+"""
+"""Script: whether a tour of hotspots, played as the camera path, is at the second one."""
 
 RADIUS = 0.5
 UP = (0.0, 0.0, 1.0)
@@ -103,6 +110,31 @@ def test_the_editor_places_changes_and_undoes_hotspots(tmp_path: Path) -> None:
         assert [(h.title, h.text) for h in saved] == [("Front", "the side that is seen first")]
         editor.changed(lambda: page.click(".hotspot-list .drop"))
         assert editor.state["hotspots"] == [] and page.locator(".hotspots button").count() == 0
+
+
+@pytest.mark.nightly
+def test_the_editor_makes_the_tour_its_camera_path(tmp_path: Path) -> None:
+    """One step of the history; played, the view rests at the second hotspot; none without hotspots."""
+    scene, hotspots = page_of_ball()
+    scene.save(tmp_path / "ball")
+    with editor_server(tmp_path / "ball") as server, editor_page(server.link, 520, 380) as editor:
+        page = editor.page
+        editor.ready()
+        page.click("button.tour")
+        page.fill("dialog[open] input[name=stop]", "1.5")
+        editor.changed(lambda: page.click("dialog[open] .primary"))
+        expected = tour_keys(hotspots, scene.first_camera, scene.up, stop_seconds=1.5)
+        keys = editor.state["keys"]
+        assert [key["seconds"] for key in keys] == [key.seconds for key in expected]
+        np.testing.assert_allclose([key["c2w"] for key in keys], [key.c2w for key in expected], atol=1e-6)
+        page.click("button.play")
+        editor.until(AT_THE_SECOND_STOP)
+        page.click("button.play")
+        editor.changed(lambda: editor.press("Control+z"))
+        assert editor.state["keys"] == []
+        for _ in hotspots:
+            editor.changed(lambda: page.click(".hotspot-list .drop >> nth=0"))
+        assert page.locator("button.tour").is_disabled()
 
 
 def page_of_ball() -> tuple[Scene, tuple[Hotspot, ...]]:

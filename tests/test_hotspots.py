@@ -12,8 +12,10 @@ import pytest
 
 from cagefield import Hotspot, HotspotView, Scene
 from cagefield.cameras.camera import Camera
+from cagefield.cameras.keyframe_files import load_keys
+from cagefield.cameras.keyframes import Timeline
 from cagefield.errors import CagefieldError, EditError, SceneError
-from cagefield.scene.hotspot_tour import FLIGHT_SECONDS, between, pose_of, tour_cameras
+from cagefield.scene.hotspot_tour import FLIGHT_SECONDS, between, pose_of, tour_cameras, tour_keys
 from cagefield.scene.hotspots import (
     MAX_HOTSPOTS,
     MAX_TEXT_CHARACTERS,
@@ -27,7 +29,8 @@ from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol.client_messages import page_messages
 from cagefield.server.protocol.conversion import state_of
-from cagefield.server.web.hotspot_handlers import change_hotspots
+from cagefield.server.protocol.hotspot_messages import TourPath
+from cagefield.server.web.hotspot_handlers import change_hotspots, set_tour
 from commands import printed, refused
 from scenes import ball_scene
 
@@ -136,6 +139,50 @@ def test_a_tour_stops_at_each_hotspot() -> None:
         tour_cameras(hotspots(), first, UP, stop_seconds=float("nan"), fps=4.0, width=64, height=48)
 
 
+def test_a_tour_as_a_camera_path_flies_as_its_video_and_rests_at_each_hotspot() -> None:
+    first = camera()
+    spots = (*hotspots(), Hotspot("Behind", (0.0, -0.5, 0.0)))
+    timeline = Timeline(tour_keys(spots, first, UP, stop_seconds=1.0), loop=False)
+    assert timeline.seconds == pytest.approx(3 * 1.0 + 2 * FLIGHT_SECONDS)
+    fps = 10.0
+    cameras = tour_cameras(spots, first, UP, stop_seconds=1.0, fps=fps, width=64, height=64)
+    rests = np.array([0.0, 0.3, 1.0, 3.5, 4.5, 7.0, 8.0])
+    poses = timeline.poses(rests)
+    np.testing.assert_allclose(poses[[1, 4, 6]], poses[[0, 3, 5]], atol=1e-9)
+    np.testing.assert_allclose(poses[2], poses[0], atol=1e-9)
+    times = 1.0 + FLIGHT_SECONDS * np.arange(1, 26) / 26  # the pictures of the first flight
+    eyes = np.array([one.origin for one in cameras[10:35]])
+    length = np.linalg.norm(eyes[-1] - eyes[0])
+    off = np.linalg.norm(timeline.poses(times)[:, :3, 3] - eyes, axis=1)
+    assert off.max() < 0.02 * length
+    many = tour_keys([Hotspot(str(n), (0.1 * n, 0, 0)) for n in range(200)], first, UP, stop_seconds=1.0)
+    assert len(many) == 400
+    with pytest.raises(SceneError, match="has no hotspots"):
+        tour_keys((), first, UP, stop_seconds=1.0)
+    with pytest.raises(SceneError, match=r"the stop is 0 s; give 0.01 to 600"):
+        tour_keys(spots, first, UP, stop_seconds=0.0)
+
+
+def test_the_command_writes_the_tour_as_a_camera_path(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = dataclasses.replace(ball_scene(), hotspots=hotspots())
+    scene.save(tmp_path / "scene")
+    words = ["hotspot", str(tmp_path / "scene"), "--tour"]
+    text = printed(capsys, *words, str(tmp_path / "tour.json"), "--stop", "2")
+    assert f"a camera path of 2 stops, 6.5 s, written to {tmp_path / 'tour.json'}" in text
+    keys, loop = load_keys(tmp_path / "tour.json")
+    expected = tour_keys(hotspots(), scene.first_camera, scene.up, stop_seconds=2.0)
+    assert not loop and [key.seconds for key in keys[:-1]] == [key.seconds for key in expected[:-1]]
+    np.testing.assert_allclose([key.c2w for key in keys], [key.c2w for key in expected], atol=1e-9)
+    assert "exists already" in refused(capsys, *words, str(tmp_path / "tour.json"))
+    assert "is a .json file" in refused(capsys, *words, str(tmp_path / "tour.mp4"))
+    ball_scene().save(tmp_path / "bare")
+    assert "has no hotspots" in refused(
+        capsys, "hotspot", str(tmp_path / "bare"), "--tour", str(tmp_path / "x.json")
+    )
+
+
 def test_names_and_numbers_find_hotspots() -> None:
     both = (
         Hotspot("2", (0, 0, 0)),
@@ -234,6 +281,23 @@ def test_a_session_places_changes_and_undoes(tmp_path: Path) -> None:
     assert session.saved
     assert [h.title for h in Scene.open(folder).hotspots] == ["b", "a", "c"]
     assert Scene.open(folder).hotspots[1].view == HotspotView(view.c2w, view.fov_y_deg)
+
+
+def test_a_session_takes_the_tour_as_its_path_and_undoes_it(tmp_path: Path) -> None:
+    scene = dataclasses.replace(ball_scene(), hotspots=hotspots())
+    scene.save(tmp_path / "scene")
+    store, session = opened(tmp_path / "scene")
+    set_tour(session, TourPath(stop=1.5), scene.first_camera, scene.up)
+    assert session.document.keys == tour_keys(hotspots(), scene.first_camera, scene.up, stop_seconds=1.5)
+    store.save(session)
+    saved = load_keys(tmp_path / "scene" / "camera_path.json")[0]
+    assert [key.seconds for key in saved[:2]] == [1.5, 0.5]
+    session.undo()
+    assert session.document.keys == ()
+    for number in (1, 2):
+        session.remove_hotspot(number)
+    with pytest.raises(SceneError, match="has no hotspots"):
+        set_tour(session, TourPath(), scene.first_camera, scene.up)
 
 
 def test_a_full_list_takes_no_more(tmp_path: Path) -> None:

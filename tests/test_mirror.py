@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 
 from cagefield.cameras.camera import Camera
-from cagefield.edits import Edit, EditStack, KernelMap, Mirror, dump_edits, parse_edits
+from cagefield.edits import (
+    Edit,
+    EditStack,
+    KernelMap,
+    Mirror,
+    PreparedEdit,
+    PreparedStack,
+    dump_edits,
+    parse_edits,
+)
+from cagefield.edits.partial_edit import partial_edit
 from cagefield.errors import EditError, EditFileError
 from cagefield.fields.sh import sh_basis
 from cagefield.fields.sh_rotation import rotate_sh
@@ -17,6 +27,7 @@ from cagefield.geometry.cage import Cage
 from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.images.metrics import psnr
 from cagefield.pages.page_splat_edits import decode_page_splat_edits, encode_page_splat_edits
+from cagefield.pages.path_states import stack_at
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.splats.bake_splats import baked_splats
 from cagefield.rendering.splats.raster_splats import changed_splats, deformed_splats
@@ -176,3 +187,11 @@ def test_a_mirrored_part_keeps_its_opacity_and_color() -> None:
     baked = baked_splats(field, EditStack([Edit.move(EVERYTHING, **BARE).mirror("z")]), split=False)
     np.testing.assert_allclose(np.sort(baked.opacities), np.sort(field.opacities), atol=1e-6)
     assert sorted(baked.sh[:, 0, 0].tolist()) == sorted(field.sh[:, 0, 0].tolist())
+
+
+def test_a_mirrored_copy_is_nothing_before_it_begins_and_mirrored_on_its_way() -> None:
+    edit = Edit.copy(CAGE, **BARE).mirror("x").translate((0.4, 0.0, 0.0))
+    assert partial_edit(edit, 0.0) is None
+    assert partial_edit(edit, 0.25) == Edit.copy(CAGE, **BARE).mirror("x").translate((0.1, 0.0, 0.0))
+    whole = PreparedStack([PreparedEdit(edit)])
+    assert [len(stack_at(whole, (part,)).edits) for part in (0.0, 0.5)] == [0, 1]

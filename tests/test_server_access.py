@@ -66,6 +66,7 @@ def test_who_may_look_sees_all_and_changes_nothing(
             "scale_change": {"meters_per_unit": 0.5},
             "put_hotspot": {"title": "a", "position": [0, 0, 0]},
             "move_hotspot": {"hotspot": 1},
+            "tour_path": {},
             "play_begin": {"play": 1},
             "render": {"what": "test_views", "out": "pictures"},
             "export": {"form": "ply"},

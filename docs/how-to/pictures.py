@@ -66,7 +66,7 @@ def main() -> None:
     name, path = sys.argv[1:]
     if name == "published":
         return published(Path(path))
-    sessions = (hotspots, frames, measure, decimated, aligned, pairs, up)
+    sessions = (hotspots, tour, frames, measure, decimated, aligned, pairs, up)
     session = {one.__name__: one for one in sessions}[name]
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / "biker"
@@ -104,6 +104,33 @@ def hotspots(scene: Scene, folder: Path) -> None:
         editor.page.fill("dialog[open] input[name=title]", "Jacket")
         editor.page.fill("dialog[open] textarea", "Leather, worn at the seams.")
         screen(editor, "hotspots-editor")
+
+
+def tour(scene: Scene, folder: Path) -> None:
+    """The tour of two hotspots as the camera path, played to its second stop."""
+    camera = near(scene, 500, 560)
+    assert isinstance(scene.field, SplatField)
+    helmet, knee = (surface(scene, camera, at) for at in (HELMET_PIXEL, KNEE_PIXEL))
+    marked = dataclasses.replace(
+        scene,
+        field=decimate_splats(scene.field, PAGE_SPLATS),
+        hotspots=(Hotspot("Helmet", helmet, "In his hand."), Hotspot("Knee slider", knee)),
+        cameras={"test": (camera,)},
+    )
+    marked.save(folder / "marked")
+    with editor_server(folder / "marked") as server, editor_page(server.link, 1100, 680) as editor:
+        editor.ready()
+        editor.page.click("button.tour")
+        editor.changed(lambda: editor.page.click("dialog[open] .primary"))
+        editor.page.locator(".hotspot-list").scroll_into_view_if_needed()
+        editor.page.click("button.play")
+        editor.until(
+            "(keys => Math.hypot(...[3, 7, 11].map(k => cagefield.camera.c2w[k] - keys[6].c2w[k])) < 0.01)"
+            "(cagefield.now.state.keys)"
+        )
+        editor.page.wait_for_timeout(500)
+        shot = editor.page.screenshot()
+        Image.open(io.BytesIO(shot)).convert("RGB").save(HERE / "hotspots-tour.jpg", quality=80)
 
 
 def frames(scene: Scene, folder: Path) -> None:

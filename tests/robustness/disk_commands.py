@@ -129,6 +129,8 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
     "import .ckpt, splats": DiskCommand("import {s}/s.ckpt -o {out}", "new"),
     "bake": DiskCommand("bake {s}/splats -o {out} --resolution 24 --compare 0", "new"),
     **{f"export {end}": DiskCommand("export {s}/splats -o {out}", f"x{end}") for end in _SPLAT_ENDINGS},
+    "export, a streamed SOG": DiskCommand("export {s}/splats -o {out}/lod-meta.json", "levels"),
+    "convert to a streamed SOG": DiskCommand("convert {s}/x.ply {out}/lod-meta.json", "levels"),
     "export, a page": DiskCommand("export {s}/splats -o {out}", "x.html"),
     "export, a page of voxels": DiskCommand("export {s}/voxels -o {out}", "x.html"),
     "export --embed": DiskCommand("export {s}/voxels -o {out} --as page --embed", "x"),

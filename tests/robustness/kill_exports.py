@@ -126,6 +126,40 @@ def _levels_problem(folder: Path, said: int) -> str | None:
     return page_folder_problem("out")(folder, said)
 
 
+def _small_streamed() -> None:
+    """Streamed SOG in leaves of 15 splats, files of 20, levels of 50, 12 and 3."""
+    from cagefield.formats.splats import sog_lod_writer
+
+    for name, value in (("LEAF_SPLATS", 15), ("FILE_SPLATS", 20), ("COARSE_SPLATS", 10)):
+        setattr(sog_lod_writer, name, value)
+
+
+def _put_streamed(folder: Path) -> None:
+    put_splats(folder)
+    _small_streamed()
+    write_splats(ball_of_splats(30), folder / "out" / "lod-meta.json")
+
+
+def _streamed(folder: Path, say: Say) -> None:
+    _small_streamed()
+    cli("export", folder / "scene", "-o", folder / "out" / "lod-meta.json", "--overwrite")
+    say(1)
+
+
+def _streamed_problem(folder: Path, said: int) -> str | None:
+    """Fault of the folder: all levels of the old splats or the new ones are there, and all their files."""
+    from cagefield.formats.splats.sog_lod_writer import sog_lod_summary
+
+    try:
+        counts, _ = sog_lod_summary(folder / "out" / "lod-meta.json")
+        found = len(read_splats(folder / "out"))
+    except Exception as error:
+        return f"unreadable: {error}"
+    if found != counts[0] or (said >= 1 and found == 30):
+        return f"lost: {found} splats are there"
+    return None
+
+
 HAS_USD = importlib.util.find_spec("pxr") is not None
 
 EXPORTS: dict[str, Command] = {
@@ -138,6 +172,7 @@ EXPORTS: dict[str, Command] = {
 
 SLOW_EXPORTS: dict[str, Command] = {
     "export --levels": Command(put_splats, _levels, _levels_problem),
+    "export, a streamed SOG": Command(_put_streamed, _streamed, _streamed_problem),
     **({f"export {ending}": _usd(ending) for ending in (".usdc", ".usdz")} if HAS_USD else {}),
     **(
         {"export, time samples": Command(_put_old_usd, _time_samples, file_problem(".usda"))}

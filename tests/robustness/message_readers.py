@@ -16,7 +16,7 @@ from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from scenes import ball_scene
 
-_MESSAGES = 50
+_MESSAGES = 51
 
 
 def _make_messages(folder: Path) -> None:
@@ -83,6 +83,7 @@ def _make_messages(folder: Path) -> None:
         {"type": "put_hotspot", "hotspot": 1, "title": "b", "position": [0.0, 0.5, 0.0]},
         {"type": "move_hotspot", "hotspot": 2, "to": 0},
         {"type": "move_hotspot", "hotspot": 1},
+        {"type": "tour_path", "stop": 2.0},
     ]
     assert len(messages) == _MESSAGES
     for number, message in enumerate(messages):
@@ -97,6 +98,7 @@ _BEGUN_BY = {
     "message47.json": "message46.json",
     "message48.json": "message46.json",
     "message49.json": "message46.json",
+    "message50.json": "message46.json",
 }
 """Messages of a drag, a preview or a hotspot need one that begins it."""
 

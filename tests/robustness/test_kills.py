@@ -42,6 +42,7 @@ pytestmark = [
         pytest.param("changes and saves, free-form", 30, 15, marks=pytest.mark.nightly),
         pytest.param("save as", 15, 5, marks=pytest.mark.nightly),
         pytest.param("export, a sequence", 12, 5, marks=pytest.mark.nightly),
+        pytest.param("export, a streamed SOG", 20, 7, marks=pytest.mark.nightly),
     ],
 )
 def test_killed_at_a_call_that_writes(tmp_path: Path, name: str, least: int, step: int) -> None:

@@ -16,8 +16,9 @@ from cagefield.files.atomic import check_writable
 class Convert:
     """Write a splat file in another format, by its ending: .ply, .compressed.ply, .spz, .sog, .splat, .glb.
 
-    Memory does not grow with the number of splats, except with --splats. .ksplat and splatfacto's checkpoints
-    are read, too.
+    USD too; and FOLDER/lod-meta.json, a streamed SOG: levels of detail, in files that a viewer loads as it
+    needs them. Memory does not grow with the number of splats, except with --splats and for levels. .ksplat
+    and splatfacto's checkpoints are read, too.
     """
 
     file: tyro.conf.Positional[Path]
@@ -82,5 +83,7 @@ class Convert:
         self._print(len(after), after.sh_degree)
 
     def _print(self, count: int, degree: int) -> None:
-        size = self.out.stat().st_size / 1e6
-        print(f"{count} splats, SH degree {degree}, {size:.3g} MB written to {self.out}")
+        from cagefield.cli.options import levels_and_bytes
+
+        levels, size = levels_and_bytes(self.out)
+        print(f"{count} splats, SH degree {degree}{levels}, {size / 1e6:.3g} MB written to {self.out}")

@@ -41,9 +41,10 @@ class Export:
     scene: tyro.conf.Positional[Path]
     """Scene folder."""
     out: Output
-    """Splats: .ply, .compressed.ply, .spz, .sog, .splat, .glb, .usda, .usdc or .usdz; a mesh: .ply or .glb;
-    points: .ply; a page that any browser opens without a server: .html; with --embed a folder. A name with
-    %04d, such as frame_%04d.ply: a file of splats for each frame of the camera path."""
+    """Splats: .ply, .compressed.ply, .spz, .sog, .splat, .glb, .usda, .usdc or .usdz; FOLDER/lod-meta.json
+    is a streamed SOG with levels of detail; a mesh: .ply or .glb; points: .ply; a page that any browser opens
+    without a server: .html; with --embed a folder. A name with %04d, such as frame_%04d.ply: a file of splats
+    for each frame of the camera path."""
     what: Annotated[What, tyro.conf.arg(name="as")] = "splats"
     """Kind of file; a file that ends in .html is a page."""
     embed: Flag = False
@@ -259,7 +260,6 @@ class Export:
         from cagefield.exporting import edited_splats, inside, upright
         from cagefield.exporting.similarity import aligned_splats, transform_field, world_to_source
         from cagefield.fields.splat_field import SplatField
-        from cagefield.formats.splats.splat_files import write_splats
         from cagefield.scene.import_splats import nearest_up
 
         if isinstance(scene.field, SplatField):
@@ -272,16 +272,25 @@ class Export:
         line = f"{len(splats)} splats, SH degree {splats.sh_degree}; {figures}"
         if self.source_coordinates:
             moved = transform_field(splats, world_to_source(scene))
-            write_splats(moved, self.out, self.axes, spz_version=self.spz_version)
-            return f"{line}\nin the coordinates of the reconstruction"
+            return f"{line}{self._write(moved)}\nin the coordinates of the reconstruction"
         up = self._up(scene)
         aligned = aligned_splats(splats, scene)
         turned = upright(aligned, up)
-        write_splats(turned, self.out, self.axes, spz_version=self.spz_version)
-        line += _aligned(scene)
+        line += self._write(turned) + _aligned(scene)
         if turned is not aligned:
             line += f"\nturned upright from {nearest_up(up)}; --up y-down keeps the scene's coordinates"
         return line
+
+    def _write(self, splats: SplatField) -> str:
+        """Writes splats in the file's axes; its levels of detail in words, empty without any."""
+        from cagefield.cli.options import levels_and_bytes
+        from cagefield.formats.splats.splat_files import write_splats
+
+        with progress_bar("Splats") as move:
+            write_splats(
+                splats, self.out, self.axes, lambda done: move(done, 1.0, ""), spz_version=self.spz_version
+            )
+        return levels_and_bytes(self.out)[0]
 
     def _fitted(self, scene: Scene) -> tuple[SplatField, str]:
         """Splats fitted to voxels, and how well."""

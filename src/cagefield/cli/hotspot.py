@@ -49,8 +49,13 @@ class HotspotCommand:
     """YAML or JSON file with a list `hotspots`, which replaces those of the scene."""
     dump: Path | None = None
     """Write the hotspots into such a file."""
+    tour: Path | None = None
+    """Write the tour as a camera path (.json), which rests at each hotspot; videos, exports along a path and
+    the editor take it."""
+    stop: float = 3.0
+    """Seconds at each hotspot of --tour."""
     overwrite: Flag = False
-    """Replace the file of --dump."""
+    """Replace the file of --dump or --tour."""
 
     def run(self) -> None:
         """Check the options, write the scene's manifest, list the hotspots."""
@@ -64,6 +69,8 @@ class HotspotCommand:
         if self.dump is not None:
             self._write(hotspots, self.dump)
         shown = self._shown(dataclasses.replace(scene, hotspots=hotspots))
+        if self.tour is not None:
+            self._write_tour(scene, [hotspot for hotspot in shown if hotspot is not None], self.tour)
         for number, (hotspot, seen) in enumerate(zip(hotspots, shown, strict=True), start=1):
             place = ", ".join(f"{round(value, 12) + 0.0:.6g}" for value in (seen or hotspot).position)
             notes = [
@@ -106,8 +113,23 @@ class HotspotCommand:
             raise CagefieldError("--add needs a position; give --at X Y Z")
         if self.title is not None and self.change is None:
             raise CagefieldError("--title is for --change; give the old title or the number")
-        if self.dump is not None and self.dump.exists() and not self.overwrite:
-            raise CagefieldError(f"{self.dump} exists already; give another name, or --overwrite")
+        if self.tour is not None and self.tour.suffix.lower() != ".json":
+            raise CagefieldError(f"{self.tour}: a camera path is a .json file; give such a name")
+        for path in (self.dump, self.tour):
+            if path is not None and path.exists() and not self.overwrite:
+                raise CagefieldError(f"{path} exists already; give another name, or --overwrite")
+
+    def _write_tour(self, scene: Scene, hotspots: list[Hotspot], path: Path) -> None:
+        from cagefield.cameras.keyframe_files import dump_path
+        from cagefield.cameras.keyframes import Timeline
+        from cagefield.files.atomic import replaced_file
+        from cagefield.scene.hotspot_tour import tour_keys
+
+        keys = tour_keys(hotspots, scene.first_camera, scene.up, stop_seconds=self.stop)
+        with replaced_file(path, parents=False) as draft:
+            draft.write_text(dump_path(keys, loop=False), encoding="utf-8")
+        seconds = Timeline(keys, loop=False).seconds
+        print(f"a camera path of {len(hotspots)} stops, {seconds:g} s, written to {path}")
 
     def _changed(self, scene: Scene) -> tuple[Hotspot, ...]:
         """The hotspots after the changes that the options ask for."""

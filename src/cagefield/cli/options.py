@@ -178,6 +178,18 @@ def check_file(path: Path, overwrite: bool) -> None:
     check_writable(path)
 
 
+def levels_and_bytes(out: Path) -> tuple[str, int]:
+    """(levels of detail in words, empty without any; bytes) of a file of splats that was written at `out`."""
+    from cagefield.formats.splats.detection import LOD_META
+
+    if out.name != LOD_META:
+        return "", out.stat().st_size
+    from cagefield.formats.splats.sog_lod_writer import sog_lod_summary
+
+    counts, size = sog_lod_summary(out)
+    return f", {len(counts)} level{'s' * (len(counts) > 1)} of detail: {', '.join(map(str, counts))}", size
+
+
 @contextmanager
 def progress_bar(what: str) -> Iterator[Callable[[float, float, str], None]]:
     """A function (done, total, note) that moves a bar on stderr; off a terminal, a line for each quarter."""

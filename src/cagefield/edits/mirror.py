@@ -37,7 +37,7 @@ class Mirror:
         return cage
 
     def part(self, t: float) -> Mirror:
-        """The mirroring itself: it has no part, and is there from the begin."""
+        """The mirroring itself: it has no part, and is there once the edit has begun."""
         return self
 
     def __str__(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from cagefield.edits.edit import Delete, Edit, Paste
+from cagefield.edits.mirror import mirrored_axes
 from cagefield.geometry.cage import Cage
 
 MIN_SHOWN_SHARE = 0.5
@@ -14,10 +15,13 @@ MIN_SHOWN_SHARE = 0.5
 def partial_edit(edit: Edit, share: float) -> Edit | None:
     """The edit with its operations and its grade done to a share in [0,1]; None where it shows nothing there.
 
+    A mirrored copy is mirrored at every share but 0.
     Raises `EditError` where an operation leads, at that share, to an impossible cage.
     """
     if isinstance(edit, Delete | Paste):
         return edit if share >= MIN_SHOWN_SHARE else None
+    if share <= 0.0 and mirrored_axes(edit.operations):
+        return None
     if share >= 1.0:
         return edit
     there = edit.replace(

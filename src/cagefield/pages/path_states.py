@@ -12,6 +12,7 @@ from cagefield.cameras.keyframes import Keyframe, Timeline
 from cagefield.completion.patcher import Patcher, PatchStage
 from cagefield.edits import Continuous, Delete, EditStack, PreparedEdit, PreparedStack
 from cagefield.edits.chains import application_order
+from cagefield.edits.mirror import mirrored_axes
 from cagefield.edits.partial_edit import partial_edit
 from cagefield.edits.patch import Patch, SplatPatch
 from cagefield.errors import EditError
@@ -179,7 +180,8 @@ def stack_at(
     found: list[PreparedEdit] = []
     for number, (step, part) in enumerate(zip(edits, parts, strict=True)):
         try:
-            there = partial_edit(step.edit, max(part, LEAST))
+            least = 0.0 if mirrored_axes(step.edit.operations) else LEAST
+            there = partial_edit(step.edit, max(part, least))
             if there is not None and there.enabled and not there.is_possible:
                 there.check()
         except EditError as error:

@@ -201,7 +201,7 @@ def dominant_plane(
 def _point(values: ArrayLike) -> Array:
     point = np.asarray(values, np.float64)
     if point.shape != (3,) or not np.isfinite(point).all():
-        raise SceneError(f"a point is {values!r:.60}; it must be 3 finite numbers")
+        raise SceneError(f"a point is {point.tolist()!r:.60}; it must be 3 finite numbers")
     return point
 
 
@@ -211,7 +211,8 @@ def _direction(values: Any) -> Array:
     except (TypeError, ValueError, OverflowError):
         direction = np.empty(0)
     if direction.shape != (3,) or not np.isfinite(direction).all() or not np.abs(direction).max() > 0.0:
-        raise SceneError(f"up is {values!r:.60}; it must be 3 finite numbers that are not all 0")
+        given = values.tolist() if isinstance(values, np.ndarray) else values
+        raise SceneError(f"up is {given!r:.60}; it must be 3 finite numbers that are not all 0")
     if not abs(np.linalg.norm(direction) - 1.0) < MAX_UNIT_ERROR:
         direction /= np.abs(direction).max()
         direction /= np.linalg.norm(direction)

@@ -3,7 +3,7 @@
 A flight turns about the points that two views look at: the point goes straight, the eye's direction from it
 turns at an even rate, its distance changes evenly in the logarithm, and u = 3 t^2 - 2 t^3 eases both ends.
 The scene's up direction stays up, so that the roll of a hotspot's camera is not seen. Exported pages fly in
-the same way (`web/src/viewer/flight.ts`).
+the same way (`web/src/viewer/flight.ts`). `tour_keys` has the tour as keyframes of a camera path.
 """
 
 from __future__ import annotations
@@ -17,12 +17,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cagefield.cameras.camera import Camera
+from cagefield.cameras.keyframes import SECONDS_RANGE, Keyframe
 from cagefield.errors import CameraError, SceneError
 from cagefield.scene.hotspots import Hotspot, HotspotView, resolved_view
 from cagefield.typing import Array
 
 FLIGHT_SECONDS = 2.5
 """Seconds from one hotspot to the next."""
+
+FLIGHT_KEYS = 4
+"""Keyframes on the way of a flight, where it is a camera path."""
+
+MAX_TOUR_KEYS = 500
+"""Maximum number of keyframes of a tour; the editor's paths have no more."""
 
 MAX_FRAMES = 100_000
 MIN_POLE_ANGLE = 0.02
@@ -90,6 +97,38 @@ def tour_cameras(
         sequence += [between(one, other, n / (flights + 1), up) for n in range(1, flights + 1)]
         sequence += [other] * stops
     return tuple(_camera(pose, up, width, height) for pose in sequence)
+
+
+def tour_keys(
+    hotspots: Sequence[Hotspot], first: Camera, up: ArrayLike, *, stop_seconds: float
+) -> tuple[Keyframe, ...]:
+    """Camera path of a tour: two keyframes of one pose at each hotspot, FLIGHT_KEYS on the way to the next.
+
+    The path rests at a hotspot for `stop_seconds`; a tour of so many hotspots that it would have more than
+    MAX_TOUR_KEYS flies straight, without keyframes on the way. `first` as in `tour_cameras`.
+
+    Raises:
+        SceneError: no hotspots, a stop that is not from .01 to 600 seconds.
+    """
+    if not hotspots:
+        raise SceneError("the scene has no hotspots; add one with `cagefield hotspot`, or in the editor")
+    if not SECONDS_RANGE[0] <= stop_seconds <= 600.0:
+        raise SceneError(f"the stop is {stop_seconds:g} s; give {SECONDS_RANGE[0]:g} to 600")
+    poses = [pose_of(resolved_view(hotspot, first, up), hotspot.position) for hotspot in hotspots]
+    between_keys = FLIGHT_KEYS if len(poses) * (2 + FLIGHT_KEYS) <= MAX_TOUR_KEYS else 0
+    step = FLIGHT_SECONDS / (between_keys + 1)
+    keys: list[Keyframe] = []
+    for number, pose in enumerate(poses):
+        if number:
+            ways = [n / (between_keys + 1) for n in range(1, between_keys + 1)]
+            keys += [_key(between(poses[number - 1], pose, way, up), up, step) for way in ways]
+        keys += [_key(pose, up, stop_seconds), _key(pose, up, step)]
+    return tuple(keys)
+
+
+def _key(pose: Pose, up: ArrayLike, seconds: float) -> Keyframe:
+    camera = _camera(pose, up, 100, 100)
+    return Keyframe(tuple(camera.c2w.reshape(-1).tolist()), pose.fov_y_deg, seconds)
 
 
 def _turned(a: Array, b: Array, u: float, up: Array) -> Array:

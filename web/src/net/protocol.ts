@@ -56,6 +56,7 @@ export type PageMessage =
   | PlaceMesh
   | PutHotspot
   | MoveHotspot
+  | TourPath
   | ScaleChange
   | UpChange
   | AlignPaste;
@@ -379,11 +380,12 @@ export interface ExportPage {
  * Writes the edited splats, the edits baked in, to a file to be downloaded; in the background.
  *
  * With `along_path`, those of each frame of the camera path: time samples of a USD file, else a zip archive
- * of a file for each frame. Splats beyond the number `splats` are merged, those of a moment alone.
+ * of a file for each frame. Splats beyond the number `splats` are merged, those of a moment alone. Levels of
+ * detail (`lod`) are of a moment, too.
  */
 export interface ExportSplats {
   type: "export";
-  form: "ply" | "compressed.ply" | "spz" | "sog" | "splat" | "glb" | "usda" | "usdc" | "usdz";
+  form: "ply" | "compressed.ply" | "spz" | "sog" | "lod" | "splat" | "glb" | "usda" | "usdc" | "usdz";
   splats?: number | null;
   along_path?: boolean;
   fps?: number;
@@ -679,6 +681,13 @@ export interface Subdivide {
    */
   cells: [number, number, number];
   interpolation?: "linear" | "bspline";
+}
+/**
+ * Makes the tour of the shown hotspots the camera path, which rests `stop` seconds at each.
+ */
+export interface TourPath {
+  type: "tour_path";
+  stop?: number;
 }
 /**
  * Change the scene's up direction.

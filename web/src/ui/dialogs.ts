@@ -16,6 +16,7 @@ const FORMS: [ExportSplats["form"], string][] = [
   ["usdc", ".usdc: USD, with usd-core"],
   ["usdz", ".usdz: USD package, with usd-core"],
 ];
+const STREAMED: [string, string][] = [["lod", ".zip: streamed SOG, levels of detail for the web"]];
 
 const PAGE = "page";
 const LEVELS = "levels";
@@ -47,6 +48,8 @@ export interface Dialogs {
   scale: (distance: number) => void;
   /** Asks for the title and the text of a hotspot; `before` are its values so far. */
   hotspot: (before: HotspotDraft) => void;
+  /** Asks how long the camera path rests at each hotspot, and makes it their tour. */
+  tour: () => void;
   /** Asks how the selected paste is aligned by pairs of points. */
   align: (pairs: PointPair[]) => void;
   render: (what: "test_views" | "camera_path") => void;
@@ -183,10 +186,20 @@ export function dialogs(app: App): Dialogs {
         },
       );
     },
+    tour() {
+      const stop = number(3, 0.1, 600);
+      Object.assign(stop, { name: "stop", step: "any" });
+      const keys = app.store.now.state?.keys.length ?? 0;
+      const note = keys === 0 ? "" : `The ${keys} keyframes of the path are replaced; undo has them.`;
+      const fields = [field("Seconds at each hotspot", stop), h("p", { class: "quiet" }, note)];
+      ask("Tour of the hotspots as the camera path", "Make the path", fields, () =>
+        app.send({ type: "tour_path", stop: Number(stop.value) }),
+      );
+    },
     download(frames) {
       const hasSplats = app.store.now.hello?.splats === true;
       const pages = hasSplats ? SPLAT_PAGES : VOXEL_PAGE;
-      const forms = frames ? FORMS : hasSplats ? [...FORMS, ...pages] : pages;
+      const forms = frames ? FORMS : hasSplats ? [...FORMS, ...STREAMED, ...pages] : pages;
       const form = h(
         "select",
         { name: "form" },

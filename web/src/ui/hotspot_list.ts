@@ -1,5 +1,5 @@
 /** Hotspots of the scene: the list in the panel, and their marks over the view. */
-import { ChevronUp, Crosshair, MapPin, Pencil, RefreshCw, Trash2 } from "lucide";
+import { ChevronUp, Crosshair, MapPin, Pencil, RefreshCw, Route, Trash2 } from "lucide";
 import type { Actions } from "../editing/actions";
 import { surfacePoint } from "../editing/measure_tool";
 import type { App } from "../app/app";
@@ -23,7 +23,7 @@ export class Hotspots {
   constructor(
     private readonly app: App,
     actions: Actions,
-    private readonly dialogs: Pick<Dialogs, "hotspot">,
+    private readonly dialogs: Pick<Dialogs, "hotspot" | "tour">,
   ) {
     const place = iconButton(
       MapPin,
@@ -31,8 +31,12 @@ export class Hotspots {
       () => actions.toggleHotspots(),
       "place",
     );
-    this.panel = section("Hotspots", h("div", { class: "bar" }, place), this.list);
-    app.store.watch(["state"], () => this.build());
+    const tour = iconButton(Route, "Tour as the camera path…", () => dialogs.tour(), "tour");
+    this.panel = section("Hotspots", h("div", { class: "bar" }, place, tour), this.list);
+    app.store.watch(["state"], ({ state }) => {
+      this.build();
+      tour.disabled = !state?.hotspots.some(({ hidden }) => !hidden);
+    });
     app.store.watch(["placesHotspot"], (now) => place.classList.toggle("on", now.placesHotspot));
     app.viewport.beforeFrame.push(() => this.arrange());
   }

@@ -39,6 +39,19 @@ _OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
 
 def write_sog(path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None) -> None:
     """Write the splats as one .sog file, complete or not at all."""
+    contents = sog_files(table, on_progress)
+    with replaced_file(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as archive:
+        for name, content in contents.items():
+            # A fixed date makes files of equal splats equal.
+            archive.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), content)
+    on_progress(1.0)
+
+
+def sog_files(table: SplatTable, on_progress: OnProgress = lambda _: None) -> dict[str, bytes]:
+    """Files of a SOG by name, meta.json first: the content of a .sog, or of a folder.
+
+    Splats are in the order of the table's sorted batches.
+    """
     count = table.count
     low, high = _limits(table)
     scale_book, color_book, palette, codes = _codebooks(table)
@@ -85,11 +98,7 @@ def write_sog(path: Path, table: SplatTable, on_progress: OnProgress = lambda _:
     for name, pixels in images.items():
         contents[name] = _webp(pixels.reshape(*size, -1))
     on_progress(0.95)
-    with replaced_file(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as archive:
-        for name, content in ((META, json.dumps(meta).encode()), *contents.items()):
-            # A fixed date makes files of equal splats equal.
-            archive.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), content)
-    on_progress(1.0)
+    return {META: json.dumps(meta).encode(), **contents}
 
 
 def _signed_log(values: AnyArray) -> AnyArray:

@@ -19,9 +19,11 @@ from cagefield.files.memory import memory_shortage
 from cagefield.formats.splats.antimatter15_splat import write_splat_rows
 from cagefield.formats.splats.axes import PLY_AXES, Axes, ConvertedTable, convert_axes
 from cagefield.formats.splats.compressed_ply import write_compressed_ply
+from cagefield.formats.splats.detection import LOD_META
 from cagefield.formats.splats.gltf import GLTF_AXES
 from cagefield.formats.splats.gltf_writer import write_splat_gltf
 from cagefield.formats.splats.open_splats import format_suffix, open_splats
+from cagefield.formats.splats.sog_lod_writer import check_sog_lod, write_sog_lod
 from cagefield.formats.splats.sog_writer import write_sog
 from cagefield.formats.splats.splat_ply import write_splat_ply
 from cagefield.formats.splats.splat_table import (
@@ -47,6 +49,7 @@ _WRITE: dict[str, tuple[Callable[[Path, SplatTable, OnProgress], None], Axes]] =
     ".compressed.ply": (write_compressed_ply, PLY_AXES),
     ".spz": (write_spz, SPZ_AXES),
     ".sog": (write_sog, PLY_AXES),
+    LOD_META: (write_sog_lod, PLY_AXES),
     ".splat": (write_splat_rows, PLY_AXES),
     ".glb": (write_splat_gltf, GLTF_AXES),
     **dict.fromkeys(USD_SUFFIXES, (write_splat_usd, USD_AXES)),
@@ -58,7 +61,7 @@ _OFFSET_SUFFIXES = (".ply", ".glb", *USD_SUFFIXES)
 MAX_ROUNDING_SIZES = 0.01
 """Maximum rounding of coordinates to float32 without an offset, in splat sizes."""
 
-_MAX_SH_DEGREE = {".compressed.ply": 3, ".sog": 3, ".glb": 3, ".splat": 0}
+_MAX_SH_DEGREE = {".compressed.ply": 3, ".sog": 3, LOD_META: 3, ".glb": 3, ".splat": 0}
 """Maximum degree of the harmonics of formats that hold less than a field."""
 
 
@@ -182,8 +185,13 @@ def find_writer(
     ending = format_suffix(path)
     if ending in USD_SUFFIXES:
         check_usd(path)
+    if ending == LOD_META:
+        check_sog_lod(path)
     if ending not in _WRITE:
-        raise FieldError(f"{path}: no format of splats that is written; these are: {', '.join(WRITABLE)}")
+        raise FieldError(
+            f"{path}: no format of splats that is written; these are: "
+            f"{', '.join((*WRITABLE, f'FOLDER/{LOD_META}'))}"
+        )
     if spz_version is None:
         return _WRITE[ending]
     if ending != ".spz":

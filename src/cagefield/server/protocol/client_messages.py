@@ -297,7 +297,8 @@ class ExportSplats(Message):
     """Writes the edited splats, the edits baked in, to a file to be downloaded; in the background.
 
     With `along_path`, those of each frame of the camera path: time samples of a USD file, else a zip archive
-    of a file for each frame. Splats beyond the number `splats` are merged, those of a moment alone.
+    of a file for each frame. Splats beyond the number `splats` are merged, those of a moment alone. Levels of
+    detail (`lod`) are of a moment, too.
     """
 
     type: Literal["export"] = "export"

@@ -42,7 +42,10 @@ InterpolationName: TypeAlias = Literal["linear", "bspline"]
 FillName: TypeAlias = Literal["surroundings", "none"]
 RelightName: TypeAlias = Literal["occlusion", "shadow", "none"]
 JobKind: TypeAlias = Literal["test_views", "camera_path"]
-SplatForm: TypeAlias = Literal["ply", "compressed.ply", "spz", "sog", "splat", "glb", "usda", "usdc", "usdz"]
+SplatForm: TypeAlias = Literal[
+    "ply", "compressed.ply", "spz", "sog", "lod", "splat", "glb", "usda", "usdc", "usdz"
+]
+"""Format of splats; `lod` is a zip archive of a streamed SOG's folder."""
 Level: TypeAlias = Literal["info", "warning", "error"]
 
 Corner: TypeAlias = Annotated[int, Field(ge=0, le=7)]

@@ -40,4 +40,11 @@ class MoveHotspot(Message):
     to: Annotated[int, Field(ge=0, lt=MAX_HOTSPOTS)] | None = None
 
 
-HotspotMessage: TypeAlias = PutHotspot | MoveHotspot
+class TourPath(Message):
+    """Makes the tour of the shown hotspots the camera path, which rests `stop` seconds at each."""
+
+    type: Literal["tour_path"] = "tour_path"
+    stop: Annotated[float, Field(ge=0.01, le=600)] = 3.0
+
+
+HotspotMessage: TypeAlias = PutHotspot | MoveHotspot | TourPath

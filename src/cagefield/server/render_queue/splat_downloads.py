@@ -137,6 +137,10 @@ class Exports:
         """Content of a file of splats: the edits as they are now, numbered from 1 along the path."""
         path = None
         if message.along_path:
+            if message.form == "lod":
+                raise CagefieldError(
+                    "a streamed SOG has the splats of a moment; choose another format for frames"
+                )
             path = CameraPath(self._keys(), self._session.document.loop, message.fps)
         return EditedSplats(form=message.form, path=path, splats=message.splats, **self._scene())
 

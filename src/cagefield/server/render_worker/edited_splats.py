@@ -11,6 +11,7 @@ from pathlib import Path
 from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import EditStack, Paste
 from cagefield.exporting.path_frames import CameraPath
+from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats.usd_writer import USD_SUFFIXES
 from cagefield.scene.alignment import Alignment
 from cagefield.scene.hotspots import Hotspot
@@ -60,8 +61,8 @@ class EditedSplats(EditedScene):
 
     @property
     def file_name(self) -> str:
-        """Name of the file; the frames of a path are a zip archive, but for USD."""
-        is_archive = self.path is not None and not is_usd(self.form)
+        """Name of the file; the frames of a path are a zip archive, but for USD, and so is a streamed SOG."""
+        is_archive = self.form == "lod" or (self.path is not None and not is_usd(self.form))
         return f"{self.name}.{self.form}.zip" if is_archive else f"{self.name}.{self.form}"
 
     @property
@@ -171,4 +172,24 @@ def write_edited(
         splats = edited_splats(scene)
         if content.splats is not None:
             splats = decimate_splats(splats, content.splats)
-        write_splats(upright(aligned_splats(splats, scene), scene.up), path)
+        turned = upright(aligned_splats(splats, scene), scene.up)
+        if content.form == "lod":
+            _write_levels(turned, content.name, path, on_progress)
+        else:
+            write_splats(turned, path, on_progress=on_progress)
+
+
+def _write_levels(field: SplatField, name: str, path: Path, on_progress: Callable[[float], None]) -> None:
+    """Write splats as an archive of a streamed SOG in a folder `name`."""
+    from cagefield.files.atomic import replaced_file
+    from cagefield.files.temporary_folders import TemporaryFolder
+    from cagefield.formats.splats.detection import LOD_META
+    from cagefield.formats.splats.splat_files import write_splats
+
+    with TemporaryFolder("splats") as scratch, replaced_file(path) as draft:
+        folder = scratch / "scene"
+        write_splats(field, folder / LOD_META, on_progress=on_progress)
+        with zipfile.ZipFile(draft, "w", zipfile.ZIP_STORED) as archive:
+            for file in sorted(folder.rglob("*")):
+                if file.is_file():
+                    archive.write(file, f"{name}/{file.relative_to(folder).as_posix()}")

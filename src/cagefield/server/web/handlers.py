@@ -40,7 +40,7 @@ from cagefield.server.render_worker.tasks import (
 from cagefield.server.render_worker.view import Display
 from cagefield.server.web.alignment_handlers import change_alignment
 from cagefield.server.web.answers import answer_of, seen_point
-from cagefield.server.web.hotspot_handlers import change_hotspots
+from cagefield.server.web.hotspot_handlers import change_hotspots, set_tour
 from cagefield.server.web.point_handlers import PointChange, change_points
 from cagefield.server.web.selection_handlers import change_selection
 from cagefield.server.web.worker_threads import run_in_thread
@@ -283,9 +283,15 @@ class MessageHandlers:
 
     @_handles(hotspot_messages.PutHotspot)
     @_handles(hotspot_messages.MoveHotspot)
-    def _change_hotspots(self, message: hotspot_messages.HotspotMessage) -> None:
+    def _change_hotspots(self, message: hotspot_messages.PutHotspot | hotspot_messages.MoveHotspot) -> None:
         change_hotspots(self._session, message)
         self._coordinator.changed()
+
+    @_handles(hotspot_messages.TourPath)
+    def _set_tour(self, message: hotspot_messages.TourPath) -> None:
+        coordinator = self._coordinator
+        set_tour(self._session, message, coordinator.store.scene.first_camera, coordinator.up)
+        coordinator.changed()
 
     @_handles(client_messages.Command)
     def _command(self, message: client_messages.Command) -> None:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from numpy.typing import ArrayLike
+
+from cagefield.cameras.camera import Camera
+from cagefield.scene.hotspot_tour import tour_keys
 from cagefield.scene.hotspots import Hotspot, HotspotView
 from cagefield.server.editor.hotspot_tracks import hotspot_tracks
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol.conversion import stills_of
-from cagefield.server.protocol.hotspot_messages import HotspotMessage, PutHotspot
+from cagefield.server.protocol.hotspot_messages import MoveHotspot, PutHotspot, TourPath
 from cagefield.server.protocol.server_messages import Answer, HotspotTrack
 from cagefield.server.web.worker_threads import run_in_thread
 
@@ -24,7 +28,17 @@ async def path_of(session: Session, request: int) -> Answer:
     )
 
 
-def change_hotspots(session: Session, message: HotspotMessage) -> None:
+def set_tour(session: Session, message: TourPath, first: Camera, up: ArrayLike) -> None:
+    """Make the tour of the shown hotspots the camera path.
+
+    `first` is the view in which the scene opens, `up` [3] the direction that is up. Raises SceneError without
+    a hotspot.
+    """
+    shown = [hotspot for hotspot in session.shown_hotspots() if hotspot is not None]
+    session.set_path(tour_keys(shown, first, up, stop_seconds=message.stop), loop=False)
+
+
+def change_hotspots(session: Session, message: PutHotspot | MoveHotspot) -> None:
     """Carry out a message. Raises `CagefieldError` where that is not possible."""
     if isinstance(message, PutHotspot):
         camera = message.camera
