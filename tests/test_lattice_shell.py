@@ -229,6 +229,17 @@ def test_random_edits(seed: int) -> None:
     check_map(random_lattice_edit(seed), 100)
 
 
+def test_correction_does_not_fold_beside_a_corner_between_samples() -> None:
+    """An edit whose correction, on the coarsest grid, folds within a twentieth of an edge from its corner."""
+    edit = random_lattice_edit(1323)
+    A, b = edit.inner.affine
+    u = np.random.default_rng(0).uniform([0.98, 0.0, 1.0], [1.02, 0.06, 1.01], (500, 3))
+    points = b + u @ A.T
+    there = edit.exact_warp.to_deformed(points)
+    assert np.linalg.det(there.jacobian).min() > 0.0
+    np.testing.assert_allclose(edit.exact_warp.to_canonical(there.points).points, points, atol=1e-7)
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize("block", range(100))
 def test_ten_thousand_random_edits(block: int) -> None:

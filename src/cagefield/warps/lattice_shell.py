@@ -28,6 +28,9 @@ MOST_CORRECTION = 0.9
 LEAST_CORRECTION_DET = 0.05
 """Least det (1 + d(rho r)/dX) beside edges and corners of the canonical cage, where r may be steep."""
 
+EDGE_SAMPLES = 33
+"""Samples of each edge of the canonical cage."""
+
 LEAST_GAP = 2e-3
 """The gap between the lattice and the outer cage, as a share of the outer cage's half-width."""
 
@@ -349,13 +352,14 @@ class Surroundings:
         """Least det (1 + d(rho r)/dX) at 4 distances beyond each face from samples of its edges and corners.
 
         Beyond a face the clamp's slope is that of the face; `slope` looks beyond edges and corners alone,
-        where it is that of the edge, or 0.
+        where it is that of the edge, or 0. Samples are dense beside corners, where r is steepest.
         """
-        u, r, dr = self._samples
+        u = edge_points(EDGE_SAMPLES)
+        r, dr = self.residual(u)
         on_face = np.where(np.abs(u - 0.5) == 0.5, 2.0 * (u - 0.5), 0.0)
         least = 1.0
         for axis in range(3):
-            rows = (on_face[:, axis] != 0.0) & ((on_face != 0.0).sum(axis=1) > 1)
+            rows = on_face[:, axis] != 0.0
             ways = on_face[rows] * np.eye(3)[axis]
             S = self._along_faces(u[rows] + ways, dr[rows])
             for rho, drho in self._outwards(u[rows], ways):
@@ -377,6 +381,17 @@ class Surroundings:
             square = rr * (drho * drho).sum(axis=1) + rho * (2.0 * (rS * drho).sum(axis=1) + rho * SS)
             most = max(most, float(square.max()))
         return float(np.sqrt(most))
+
+
+def edge_points(count: int) -> Array:
+    """Points u [12 count,3] of a unit cube's edges, `count` on each, at the extrema of a Chebyshev polynomial."""
+    along = 0.5 - 0.5 * np.cos(np.pi * np.arange(count) / (count - 1))
+    ends = bspline_lattice.grid((2, 2, 1))[:, :2]
+    edges = [
+        np.insert(np.repeat(ends, count, axis=0), axis, np.tile(along, len(ends)), axis=1)
+        for axis in range(3)
+    ]
+    return np.concatenate(edges)
 
 
 @flow_between.register
