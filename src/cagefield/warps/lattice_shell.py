@@ -384,7 +384,7 @@ class Surroundings:
 
 
 def edge_points(count: int) -> Array:
-    """Points u [12 count,3] of a unit cube's edges, `count` on each, at the extrema of a Chebyshev polynomial."""
+    """Points u [12 count,3] of a unit cube's edges, `count` on each, at extrema of a Chebyshev polynomial."""
     along = 0.5 - 0.5 * np.cos(np.pi * np.arange(count) / (count - 1))
     ends = bspline_lattice.grid((2, 2, 1))[:, :2]
     edges = [
