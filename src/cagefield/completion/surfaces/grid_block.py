@@ -109,7 +109,8 @@ class GridBlock:
         smooth = ndimage.gaussian_filter(1.0 - np.exp(-self.depth), 1.2)
         check_cancelled()
         slope = -np.stack(np.gradient(smooth), axis=-1) / self.field.voxel_size
-        length = np.linalg.norm(slope, axis=-1, keepdims=True)
+        check_cancelled()
+        length = np.sqrt(np.einsum("xyza,xyza->xyz", slope, slope))[..., None]
         return np.asarray(slope / np.maximum(length, 1e-6), np.float32)
 
     def positions(self, mask: Mask) -> Array:
