@@ -18,7 +18,6 @@ from cagefield.edits.device.kernels.edit_maps import EditArgs
 from cagefield.edits.device.packing import (
     ALONE,
     CHANGED_BOX,
-    CONTINUOUS,
     FIRST,
     FLOW,
     GRADED,
@@ -36,7 +35,7 @@ from cagefield.edits.device.packing import (
     pack_warp,
     widened,
 )
-from cagefield.edits.edit import Continuous, Edit, Paste
+from cagefield.edits.edit import Continuous, Discrete, Edit, Paste
 from cagefield.edits.edit_map import EditMap
 from cagefield.edits.mapped_samples import SampleGrade
 from cagefield.edits.prepared import PreparedEdit
@@ -87,10 +86,11 @@ class DeviceStack:
             for column, layer in ((UNDER_PLACE, step.under), (PART_PLACE, step.part)):
                 if layer is not None:
                     params[number, column] = next(places)
-        for number in range(len(steps)):
+        for number, step in enumerate(steps):
             met = _meets(params[:number], params[number])
             params[number, ALONE] = not met.any()
-            params[number, IS_CUT] = params[number, CONTINUOUS] == 0.0 or params[:number][met, IS_CUT].any()
+            is_cut = isinstance(step.edit, Discrete) and not step.is_light
+            params[number, IS_CUT] = is_cut or params[:number][met, IS_CUT].any()
         boxes = widened(np.concatenate([np.zeros((0, 2, 3))] + [step.boxes for step in steps]))
         packed = cls(params, nodes, len(steps), boxes.astype(np.float32))
         for array in (packed.params, packed.lattice, packed.boxes):

@@ -49,7 +49,7 @@ GRADE_DENSITY = GRADED + 10  # factor of density at weight 1
 GRADE_INNER = GRADED + 11  # frame [4,3] of the inner cage of a `GradeFalloff`, of a continuous edit
 GRADE_OUTER = GRADED + 23  # frame [4,3] of the outer cage
 STILL = GRADED + 35  # 1 where the map is the identity: an edit that grades and moves nothing
-IS_CUT = GRADED + 36  # 1 for a discrete edit, and where samples of the edit may be moved on by one
+IS_CUT = GRADED + 36  # 1 for a discrete edit but that of a light, and where one may move its samples on
 WIDTH = GRADED + 37
 
 EDGE = 1e-6

@@ -18,7 +18,7 @@ from cagefield.edits.device.kernels.edit_maps import EditArgs
 from cagefield.rendering.voxels.kernels.edited_ray import BENT, MANY, map_along
 from cagefield.rendering.voxels.kernels.grid import vec3
 
-SPAN = 4
+SPAN = 5
 """Samples from the beginning of a segment to its end."""
 
 TOLERANCE = 0.05
