@@ -166,6 +166,48 @@ def test_a_mesh_file_becomes_a_cage_whose_edges_are_dragged(editor: EditorPage, 
     assert "open.obj: mesh is open" in editor.said("mesh is open")
 
 
+def test_keys_do_nothing_else_during_a_drag(editor: EditorPage, scene: Path) -> None:
+    editor.loaded(scene.parent / "lattice.yaml")
+    editor.tools(tool="select")
+    editor.drag(editor.part("point", 8), (-8, -6))
+    before, edits = editor.state["entry"], editor.edits
+    editor.page.evaluate(
+        "window.unheld = []; addEventListener('keydown', e => e.defaultPrevented || unheld.push(e.key))"
+    )
+    with editor.held(editor.part("point", 9), (10, -8)):
+        editor.until("cagefield.drag !== null && cagefield.drag.seq > 0")
+        editor.press("Control+z", "Control+Shift+z", "Delete", "Alt+o", "Control+d", "Control+s", "Tab")
+        assert editor.page.evaluate("unheld.filter(key => !['Control', 'Shift', 'Alt'].includes(key))") == []
+        assert editor.page.evaluate("cagefield.drag !== null && cagefield.now.mode === 'edit'")
+        editor.press("Escape")
+        editor.until("cagefield.drag === null")
+    editor.settle()
+    assert editor.state["entry"] == before and editor.edits == edits
+
+
+def test_a_drag_is_given_up_where_another_page_undoes(editor: EditorPage, server: EditorServer) -> None:
+    editor.tools(tool="select")
+    other = editor.tab(server.link)
+    other.ready()
+    editor.page.bring_to_front()
+    start, entry = editor.part("point", 9), editor.state["entry"]
+    with editor.held(start, (16, -10)):
+        editor.until("cagefield.drag !== null && cagefield.drag.seq > 0")
+        other.press("Control+z")
+        editor.until(f"cagefield.drag === null && cagefield.now.state.entry === {entry - 1}")
+        editor.said("this drag is over")
+        np.testing.assert_allclose(editor.part("point", 9), start, atol=0.1)
+        editor.page.mouse.move(start[0] + 30, start[1])
+        np.testing.assert_allclose(editor.part("point", 9), start, atol=0.1)
+    editor.settle()
+    assert editor.state["entry"] == entry - 1 and np.allclose(moves(editor), 0.0)
+    assert other.edits == editor.edits
+    other.page.close()
+    editor.page.bring_to_front()
+    editor.drag(editor.part("point", 9), (10, -8))
+    assert np.linalg.norm(moves(editor)[9]) > 0.02
+
+
 def test_the_help_lists_the_keys(editor: EditorPage) -> None:
     editor.press("?")
     editor.until("!document.querySelector('.help').hidden")

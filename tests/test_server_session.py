@@ -91,6 +91,16 @@ def test_a_drag_that_is_over_says_so() -> None:
         s.drag_end(1, 1, Translate((0.1, 0, 0)))
 
 
+def test_drags_end_with_the_removal_of_their_edit_and_no_other() -> None:
+    s = session(ARM, CUP)
+    s.drag_begin(1, 1, 1, "field")
+    s.drag_begin(2, 4, 2, "field")
+    s.remove(1)
+    assert not s.drags.goes_on(1, 1) and s.drags.goes_on(2, 4) and not s.drags.goes_on(2, 3)
+    s.undo()
+    assert not s.drags.goes_on(2, 4) and not s.moving
+
+
 def test_two_pages_drag_at_once_and_both_drags_are_shown_and_kept() -> None:
     s = session(ARM, CUP)
     s.drag_begin(1, 1, 1, "field")
@@ -110,7 +120,7 @@ def test_a_drag_of_an_edit_that_another_page_removed_is_an_error_and_changes_not
     s.drag(1, 1, Translate((0.1, 0, 0)))
     s.remove(2)
     assert [entry.edit.name for entry in s.shown.entries] == ["arm"]
-    with pytest.raises(EditError, match="edit 2 is not there any more"):
+    with pytest.raises(EditError, match="this drag is over"):
         s.drag_end(1, 1, Translate((0.1, 0, 0)))
     assert s.history.names[-1] == "Remove of cup" and not s.drags
 

@@ -138,6 +138,31 @@ def test_a_drag_stops_at_the_outer_cage(server: EditorServer) -> None:
         assert state["edits"][0]["operations"] == []
 
 
+@pytest.mark.parametrize("how", ["undo", "remove"])
+def test_a_page_is_told_once_that_its_drag_was_given_up(server: EditorServer, how: str) -> None:
+    with page(server) as (one, _), page(server) as (two, _):
+        loaded = load(one, BALL)
+        number, entry = loaded["edits"][0]["id"], loaded["entry"]
+        shift = {"kind": "translate", "by": [0.1, 0, 0]}
+        two.send("apply", edit=number, target="field", operation=shift)
+        one.state(lambda s: s["entry"] == entry + 1)
+        one.send("drag_begin", drag=7, edit=number, target="field")
+        one.send("drag", drag=7, seq=1, operation=shift)
+        one.until(lambda m: m["type"] == "dragged")
+        two.send("command", name=how, edit=number)
+        one.until(lambda m: m["type"] == "drag_over" and m["drag"] == 7)
+        one.messages.clear()
+        state = one.state(lambda s: s["entry"] == (entry if how == "undo" else entry + 2))
+        # On their way before the page has heard of it.
+        one.send("drag", drag=7, seq=2, operation=shift)
+        one.send("drag_end", drag=7, seq=3, operation=shift)
+        one.send("ask", request=5, what="edit_text", edit=number)
+        one.until(lambda m: m["type"] == "answer" and m["request"] == 5)
+        told = [m["text"] for m in one.messages if m["type"] == "notice" and "drag" in m["text"]]
+        assert len(told) == 1 and told[0].startswith("this drag is over")
+        assert all(m["entry"] == state["entry"] for m in one.messages if m["type"] == "state")
+
+
 def test_two_pages_show_the_same_and_look_from_their_own_cameras(server: EditorServer) -> None:
     with page(server) as (one, hello), page(server) as (two, _):
         number = load(one, BALL)["edits"][0]["id"]

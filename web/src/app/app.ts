@@ -200,6 +200,11 @@ export class App {
 
   cancelDrag(): void {
     this.drag?.cancel();
+    this.dropDrag();
+  }
+
+  /** Forgets the drag; the pointer does nothing more until it is released. */
+  private dropDrag(): void {
     this.drag = null;
     this.store.set({ limit: null });
     this.viewport.invalidate();
@@ -263,6 +268,9 @@ export class App {
         if (this.drag?.takeAnswer(message)) this.viewport.invalidate();
         if (this.drag?.id === message.drag && !this.drag.ended) this.takeCarriers(message.carried);
         if (this.drag && !this.drag.ended) this.store.set({ limit: this.drag.why });
+        break;
+      case "drag_over":
+        if (this.drag?.id === message.drag) this.dropDrag();
         break;
       case "answer":
         this.questions.get(message.request)?.(message.failed ? null : message);

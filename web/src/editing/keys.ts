@@ -277,9 +277,13 @@ export function listenForKeys(app: App, actions: Actions, pointer: Pointer, all:
       app.store.set({ proportional: !app.store.now.proportional });
       return pointer.applyMotion();
     }
-    if (pointer.dragging && name !== "Escape") return;
-    if (name === "Ctrl+C" && !getSelection()?.isCollapsed) return;
     const binding = byKey.get(name);
+    if (pointer.dragging && name !== "Escape") {
+      // Not the browser's own action either: another focus, its window to save the page.
+      if (binding) event.preventDefault();
+      return;
+    }
+    if (name === "Ctrl+C" && !getSelection()?.isCollapsed) return;
     if (!binding) return;
     event.preventDefault();
     if (isReadOnly(app.store.now) && binding.group !== "View" && !READ_ONLY_KEYS.includes(name))

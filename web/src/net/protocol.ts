@@ -60,7 +60,7 @@ export type PageMessage =
   | ScaleChange
   | UpChange
   | AlignPaste;
-export type ServerMessage = Hello | State | Dragged | Answer | Notice | Preview | Preparing | Job;
+export type ServerMessage = Hello | State | Dragged | DragOver | Answer | Notice | Preview | Preparing | Job;
 
 /**
  * Replace the operations of a paste by the similarity that pairs of points give.
@@ -746,6 +746,13 @@ export interface HistogramCounts {
 export interface Carried {
   edit: number;
   carrier: number[] | null;
+}
+/**
+ * The page's drag was given up, by a step of the history or the removal of its edit; a notice says so.
+ */
+export interface DragOver {
+  type: "drag_over";
+  drag: number;
 }
 /**
  * Result of a `drag`: `part` of the operation was followed; `why` where `part` is below 1.

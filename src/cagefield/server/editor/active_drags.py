@@ -9,6 +9,9 @@ from cagefield.errors import EditError
 from cagefield.server.editor.document import Document, Entry
 from cagefield.server.editor.drag_solver import Moved, Target, move
 
+DRAG_OVER = "this drag is over: the edit was changed or removed, or the server restarted; begin again"
+"""Notice for a page whose drag was given up."""
+
 
 @dataclass(frozen=True)
 class Drag:
@@ -54,6 +57,14 @@ class Drags:
         """All drags are given up."""
         self._drags.clear()
 
+    def keep(self, document: Document) -> None:
+        """Drags of edits that the document does not have are given up."""
+        self._drags = {page: drag for page, drag in self._drags.items() if document.has(drag.before.id)}
+
+    def goes_on(self, page: int, number: int) -> bool:
+        """True where the drag of this number goes on."""
+        return page in self._drags and self._drags[page].number == number
+
     def dragged(self, page: int) -> Entry | None:
         """Present result of the page's drag, or None without a drag."""
         drag = self._drags.get(page)
@@ -69,5 +80,5 @@ class Drags:
     def _find(self, page: int, number: int) -> Drag:
         drag = self._drags.get(page)
         if drag is None or drag.number != number:
-            raise EditError("this drag is over: the edit was changed or the server restarted; begin it again")
+            raise EditError(DRAG_OVER)
         return drag

@@ -297,5 +297,6 @@ class SessionState:
         if too_large is not None:
             raise EditError(too_large)
         self.preview = None
+        self.drags.keep(document)
         self.history = self.history.push(name, document)
         self.revision += 1

@@ -199,6 +199,13 @@ class Dragged(Message):
         return self.type
 
 
+class DragOver(Message):
+    """The page's drag was given up, by a step of the history or the removal of its edit; a notice says so."""
+
+    type: Literal["drag_over"] = "drag_over"
+    drag: int
+
+
 class Still(Message):
     """A camera on the camera path."""
 
@@ -288,7 +295,8 @@ class Job(Message):
 
 
 ServerMessage: TypeAlias = Annotated[
-    Hello | State | Dragged | Answer | Notice | Preview | Preparing | Job, Field(discriminator="type")
+    Hello | State | Dragged | DragOver | Answer | Notice | Preview | Preparing | Job,
+    Field(discriminator="type"),
 ]
 
 

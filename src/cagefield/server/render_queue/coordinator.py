@@ -16,6 +16,7 @@ from cagefield.fields.splat_field import SplatField
 from cagefield.scene.alignment import Direction
 from cagefield.scene.paste_sources import up_of_cameras
 from cagefield.selection.element_selection import Selection
+from cagefield.server.editor.active_drags import DRAG_OVER
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import server_messages
@@ -57,6 +58,8 @@ class Page:
     display: Display = field(default_factory=Display)
     drag: int = 0
     seq: int = 0
+    lost_drag: int = 0
+    """Its last drag that the session gave up, of which messages may still come."""
     has: tuple[str, ...] = ()
     """Keys of the layers that the page already has, of edits that it draws itself."""
 
@@ -207,9 +210,17 @@ class Coordinator:
         if self.store.trouble is not None and self.store.trouble != self._trouble:
             self.notice("warning", self.store.trouble)
         self._trouble = self.store.trouble
+        self._tell_lost_drags()
         if any(page is not but for page in self.pages.values()):
             self.broadcast(self.state(), but)
         self.pump()
+
+    def _tell_lost_drags(self) -> None:
+        for page in self.pages.values():
+            if page.drag and not self.session.drags.goes_on(page.number, page.drag):
+                page.lost_drag, page.drag = page.drag, 0
+                page.send_queue.put(server_messages.DragOver(drag=page.lost_drag))
+                page.notice("error", DRAG_OVER)
 
     def save(self) -> None:
         """Save the document to its scene folder."""

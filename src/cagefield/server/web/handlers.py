@@ -131,11 +131,15 @@ class MessageHandlers:
     @_handles(client_messages.DragBegin)
     def _drag_begin(self, message: client_messages.DragBegin) -> None:
         self._page.drag, self._page.seq = message.drag, 0
-        self._session.drag_begin(self._page.number, message.drag, message.edit, message.target)
-        self._coordinator.changed()
+        try:
+            self._session.drag_begin(self._page.number, message.drag, message.edit, message.target)
+        finally:
+            self._coordinator.changed()
 
     @_handles(client_messages.DragMove)
     def _drag(self, message: client_messages.DragMove) -> None:
+        if message.drag == self._page.lost_drag:
+            return
         moved = self._session.drag(self._page.number, message.drag, operation_of(message.operation))
         self._page.seq = message.seq
         carriers = self._session.carriers_of(self._page.number)
@@ -144,6 +148,8 @@ class MessageHandlers:
 
     @_handles(client_messages.DragEnd)
     def _drag_end(self, message: client_messages.DragEnd) -> None:
+        if message.drag == self._page.lost_drag:
+            return
         self._page.drag = 0
         try:
             moved = self._session.drag_end(self._page.number, message.drag, operation_of(message.operation))
