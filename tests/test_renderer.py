@@ -10,7 +10,9 @@ import pytest
 
 from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
-from cagefield.edits import Edit, EditStack, Trilinear
+from cagefield.edits import Edit, EditStack, PreparedEdit, PreparedStack, Trilinear
+from cagefield.edits.device.packing import IS_CUT
+from cagefield.edits.device_stack import DeviceStack
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.images.metrics import psnr
@@ -310,6 +312,16 @@ def test_maps_interpolated_along_rays_show_each_sample_mapped_alone():
     difference = np.abs(interpolated - alone)
     assert difference.max() < 0.01
     assert np.sqrt((difference**2).mean()) < 5e-4
+
+
+def test_maps_are_interpolated_through_a_light_and_not_where_a_cut_reaches():
+    far = Edit.delete(Cage.box((-0.9, 0.0, 0.0), 0.05))
+    light = PreparedEdit(Edit.delete(Cage.box((-0.2, 0, 0.1), 1.6)), is_light=True)
+    lit = DeviceStack.from_stack(PreparedStack([PreparedEdit(FLOWS[0], light=light)]))
+    assert not lit.params[:, IS_CUT].any()
+    # The cut lies in the first one's box, which the second one's reaches.
+    cut = DeviceStack.from_stack(EditStack([far, *FLOWS]))
+    assert cut.params[:, IS_CUT].all()
 
 
 def test_rays_step_over_no_cut_that_is_thinner_than_a_segment():
