@@ -44,3 +44,13 @@ def test_a_light_that_takes_too_long_is_left_to_the_editor(splats, patches, tmp_
     assert "left to the editor" in printed(capsys, "import", splats, "-o", tmp_path / "scene")
     assert not list(patches.glob("*.npz"))
     assert len(Scene.open(tmp_path / "scene").field) == len(room(box=True))
+
+
+def test_an_imported_scene_stays_where_its_light_fails(splats, tmp_path, capsys, monkeypatch):
+    def fails(*_arguments: object, **_options: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(light_preparation, "MAX_SECONDS", 600.0)
+    monkeypatch.setattr(patcher.Patcher, "warm", fails)
+    assert "left to the editor" in printed(capsys, "import", splats, "-o", tmp_path / "scene")
+    assert (tmp_path / "scene" / "scene.json").is_file()

@@ -17,10 +17,11 @@ class _OutOfTimeError(Exception):
 def prepare_light(path: Path) -> None:
     """Compute the light of the scene in a folder, as relighting needs it, into the user's cache.
 
-    Prints whether it is there. A NeRF has none before it is baked. Ctrl-C leaves the light to the editor: the
-    scene is written by then.
+    Prints whether it is there. A NeRF has none before it is baked. Ctrl-C, an error, and too little memory
+    leave the light to the editor: the scene is written by then.
     """
     from cagefield.compute import devices
+    from cagefield.errors import CagefieldError
     from cagefield.fields.splat_field import SplatField
     from cagefield.fields.voxel_field import VoxelField
     from cagefield.scene.scene import Scene
@@ -41,5 +42,5 @@ def prepare_light(path: Path) -> None:
     try:
         scene.patcher.warm(proceed=proceed)
         print(f"light ready after {time.monotonic() - began:.1f} s")
-    except (_OutOfTimeError, KeyboardInterrupt):
+    except (_OutOfTimeError, KeyboardInterrupt, CagefieldError, MemoryError):
         print("light left to the editor, which computes it beside its first pictures")
