@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from functools import cache
 from itertools import product
 
@@ -11,8 +12,9 @@ import pytest
 from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack, PreparedEdit, PreparedStack, Trilinear
-from cagefield.edits.device.packing import IS_CUT
+from cagefield.edits.device.packing import ALONE, BASE_PLACE, IS_CUT
 from cagefield.edits.device_stack import DeviceStack
+from cagefield.edits.patch import Patch
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.images.metrics import psnr
@@ -322,6 +324,38 @@ def test_maps_are_interpolated_through_a_light_and_not_where_a_cut_reaches():
     # The cut lies in the first one's box, which the second one's reaches.
     cut = DeviceStack.from_stack(EditStack([far, *FLOWS]))
     assert cut.params[:, IS_CUT].all()
+
+
+def lit_by(region: Cage, under: VoxelField) -> PreparedEdit:
+    """A light: samples in the region read another field."""
+    return PreparedEdit(Edit.delete(region), Patch(region, under), is_light=True)
+
+
+@pytest.mark.parametrize(("size", "is_held"), [(1.9, True), (0.9, False)])
+def test_lattices_and_moves_over_a_light_show_its_layer(size: float, is_held: bool):
+    """The light holds all that the lattice moves, or a part of it; the move is in V or falls through."""
+    field = ball()
+    under = dataclasses.replace(field, sh=(0.2 * field.sh).astype(np.float32))
+    inner = Cage.box((-0.2, 0, 0.1), (0.5, 0.6, 0.6))
+    turned = Edit.continuous(inner, inner.grown(0.25), lattice=24).rotate((0.1, 0.3, 0.2))
+    moved = Edit.move(Cage.box((0.3, 0, 0.2), 0.3)).translate((0.2, -0.1, 0.3))
+    light = lit_by(Cage.box((0, 0, 0), size), under)
+    stack = PreparedStack([PreparedEdit(turned, light=light), PreparedEdit(moved)])
+    packed = DeviceStack.from_stack(stack).params
+    assert packed[1, ALONE] == is_held
+    assert packed[1, BASE_PLACE] == (stack.places[0] if is_held else 0)
+    fused = VoxelRenderer(field, stack, step=0.1).render(FEWER_PIXELS, background="white")
+    plain = sampled(field, stack, camera=FEWER_PIXELS)
+    unlit = sampled(field, EditStack([turned, moved]), camera=FEWER_PIXELS)
+    assert psnr(plain.rgb, unlit.rgb) < 30
+    assert psnr(fused.rgb, plain.rgb) > 42
+
+
+def test_a_light_leaves_the_occupancy_of_its_field():
+    # Faces of the region lie on no vertex: some blocks are partly in it.
+    field = ball()
+    lit = VoxelRenderer(field, PreparedStack([lit_by(Cage.box((0.1, 0, 0), (0.93, 1.01, 0.71)), field)]))
+    assert (lit.occupancy.blocks == occupancy.of_field(field).blocks).all()
 
 
 def test_rays_step_over_no_cut_that_is_thinner_than_a_segment():

@@ -16,13 +16,19 @@ from cagefield.edits.buffer_pool import BufferPool
 from cagefield.edits.device.kernels.device_stack import grade_samples, map_samples
 from cagefield.edits.device.kernels.edit_maps import EditArgs
 from cagefield.edits.device.packing import (
+    AFFINE,
     ALONE,
+    BASE_PLACE,
+    CENTER,
     CHANGED_BOX,
+    CONTINUOUS,
     FIRST,
     FLOW,
     GRADED,
     IMAGE,
     IS_CUT,
+    LAST,
+    MATRIX,
     OFFSET,
     PART_PLACE,
     RECORD,
@@ -88,7 +94,8 @@ class DeviceStack:
                     params[number, column] = next(places)
         for number, step in enumerate(steps):
             met = _meets(params[:number], params[number])
-            params[number, ALONE] = not met.any()
+            base = _base_place(params[:number][met], params[number])
+            params[number, ALONE], params[number, BASE_PLACE] = base is not None, base or 0.0
             is_cut = isinstance(step.edit, Discrete) and not step.is_light
             params[number, IS_CUT] = is_cut or params[:number][met, IS_CUT].any()
         boxes = widened(np.concatenate([np.zeros((0, 2, 3))] + [step.boxes for step in steps]))
@@ -175,15 +182,37 @@ def _flow_table(edit: Continuous) -> NDArray[np.float32]:
     return flow_table.table(shell) if isinstance(shell, FlowShell) else np.zeros((0, 3), dtype=np.float32)
 
 
+def _base_place(met: NDArray[np.float32], row: NDArray[np.float32]) -> float | None:
+    """Place at which all that an edit moves is read beneath it, None where there are several.
+
+    `met` [E,WIDTH] are the earlier edits that it meets (`_meets`). A layer of the last one's region is that
+    place, where the region holds all of it.
+    """
+    if not len(met):
+        return 0.0
+    last, region = met[-1], met[-1, RECORDS + RECORD : RECORDS + 2 * RECORD]
+    if last[CONTINUOUS] > 0.5 or last[FIRST] < 0.5 or last[LAST] < 1.5 or region[AFFINE] < 0.5:
+        return None
+    W, center = region[MATRIX : MATRIX + 9].reshape(3, 3), region[CENTER : CENTER + 3]
+    corners = np.concatenate([np.stack(np.meshgrid(*box.T), -1).reshape(-1, 3) for box in _moved_boxes(row)])
+    is_inside = np.abs((corners - center) @ W.T).max(initial=0.0) <= 1.0
+    return float(last[UNDER_PLACE]) if is_inside else None
+
+
 def _meets(others: NDArray[np.float32], row: NDArray[np.float32]) -> Mask:
-    """Rows [E] whose box meets that of `row`, or that of the part of the field that V shows."""
-    boxes = [(row[CHANGED_BOX : CHANGED_BOX + 3], row[CHANGED_BOX + 3 : CHANGED_BOX + 6])]
+    """Rows [E] that move samples, in a box that meets that of `row` or that of what it moves."""
+    meets = np.zeros(len(others), bool)
+    for low, high in (row[CHANGED_BOX : CHANGED_BOX + 6].reshape(2, 3), *_moved_boxes(row)):
+        near = others[:, CHANGED_BOX : CHANGED_BOX + 3] <= high
+        meets |= (near & (others[:, CHANGED_BOX + 3 : CHANGED_BOX + 6] >= low)).all(axis=1)
+    return meets & (others[:, STILL] < 0.5)
+
+
+def _moved_boxes(row: NDArray[np.float32]) -> list[NDArray[np.float32]]:
+    """Boxes [2,3] that hold the points at which an edit shows the field in place of its samples'."""
+    boxes = [row[CHANGED_BOX : CHANGED_BOX + 6].reshape(2, 3)] if row[CONTINUOUS] > 0.5 else []
     if row[FIRST] == 0 and row[PART_PLACE] == 0:
         image = row[RECORDS + IMAGE : RECORDS + RECORD].reshape(8, 3)
         reach = np.abs(image[1:]).sum(axis=0)
-        boxes.append((image[0] - reach, image[0] + reach))
-    meets = np.zeros(len(others), bool)
-    for low, high in boxes:
-        near = others[:, CHANGED_BOX : CHANGED_BOX + 3] <= high
-        meets |= (near & (others[:, CHANGED_BOX + 3 : CHANGED_BOX + 6] >= low)).all(axis=1)
-    return meets
+        boxes.append(np.stack([image[0] - reach, image[0] + reach]))
+    return boxes

@@ -35,7 +35,7 @@ OFFSET = 10  # first lattice node, or table's entry, as 65536 * [10] + [11]: a f
 TO_NODES = 12  # origin [3] and matrix [3,3] of the lattice, node units
 NODE_BOX = 24  # min, max of the outer cage in node units, where it is a parallelepiped
 SIMPLE = 30  # 1 where V, if it has a record, and V^o are parallelepipeds, phi is affine, the shell a lattice
-ALONE = 31  # 1 where no earlier edit reaches into the edit's box, or that of V^c where V shows the field
+ALONE = 31  # 1 where all that the edit moves is read at one place beneath it, `BASE_PLACE`
 UNDER_PLACE = 32  # where samples of a discrete edit's region are read: `EMPTY_PLACE`, or the place of a layer
 PART_PLACE = (
     33  # where samples of V are read: 0, the field as the earlier edits make it, or the place of a layer
@@ -50,7 +50,10 @@ GRADE_INNER = GRADED + 11  # frame [4,3] of the inner cage of a `GradeFalloff`, 
 GRADE_OUTER = GRADED + 23  # frame [4,3] of the outer cage
 STILL = GRADED + 35  # 1 where the map is the identity: an edit that grades and moves nothing
 IS_CUT = GRADED + 36  # 1 for a discrete edit but that of a light, and where one may move its samples on
-WIDTH = GRADED + 37
+BASE_PLACE = (
+    GRADED + 37
+)  # 0 where no earlier edit reaches what the edit moves, or the place of the region that holds all of it
+WIDTH = GRADED + 38
 
 EDGE = 1e-6
 """A sample counts as inside a hexahedron when its xi is within this of [-1,1]^3: rounding in float32."""

@@ -7,7 +7,9 @@ A probe at a lattice point p maps it to canonical space and looks for an occupie
 of the image (L-infinity norm), which covers the images of all points nearer to p than to another lattice
 point, to first order. The first pass probes block corners (spacing 2 cells, half a cell added) against
 occupied blocks, and takes the neighbors' corners too; the second probes the 27 cell corners of each block
-that passed (spacing 1) against the densities themselves. A coarse pass is the first one alone, by bricks.
+that passed (spacing 1) against the densities themselves. Where the map is the identity at a corner, only
+vertices of the block itself are looked at: no others are read in it. A coarse pass is the first one alone, by
+bricks.
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
-"""One edit along a stretch of a ray: where the edit is affine and shown by a lattice, so is the ray in it.
+"""Edits along a ray: stretches in which its samples are mapped alike.
 
-A ray is walked in stretches, along each of which the same edits' boxes hold it. In a stretch of one edit
-only, whose cages are parallelepipeds and whose shell is a lattice (`SIMPLE` in
-`cagefield.edits.device.packing`), it runs straight through the inner region also in canonical space, and
-straight through the lattice. Both lines and where they begin and end are found once; a sample on them costs a
-multiplication in the inner region and one lattice lookup in the shell. Of a discrete edit, V and the region
-are such stretches of the ray.
+Stretches end where the ray enters or leaves an edit's box, V, its outer cage or its region. Edits are tried
+from the last to the first. A discrete edit changes nothing outside of V and of its region, and the one before
+it is tried; in the region its layer is read. In V, where that is a parallelepiped, the ray is straight also
+in canonical space; in the shell of a lattice it is straight in node units. Both lines are found once: a
+sample costs a multiplication in V, and one lattice lookup in the shell. They need all that the edit moves to
+be read at one place (`ALONE` in `cagefield.edits.device.packing`); elsewhere each sample is mapped through
+the stack by itself.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
@@ -17,6 +18,7 @@ from cagefield.edits.device.kernels.lattice import displacement, first_node, to_
 from cagefield.edits.device.packing import (
     AFFINE,
     ALONE,
+    BASE_PLACE,
     CENTER,
     CHANGED_BOX,
     CONTINUOUS,
@@ -31,92 +33,120 @@ from cagefield.edits.device.packing import (
     RECORDS,
     RESOLUTION,
     SIMPLE,
+    STILL,
     TO_NODES,
     UNDER_PLACE,
 )
 from cagefield.rendering.voxels.kernels.grid import vec3
-from cagefield.rendering.voxels.kernels.ray_grid import safe_inverse, slab, vec2
+from cagefield.rendering.voxels.kernels.ray_grid import safe_inverse, slab
 
 STAYED, BENT, STRAIGHT = 0, 1, 2
 """How a sample was moved: not at all, along a direction of its own, along the one that its ray has in V^c."""
 
+IN_PLACE, LINE, LATTICE, MIXED = range(4)
+"""Stretches whose samples stay where they are; lie on a line in canonical space; lie in one lattice; are
+mapped one by one."""
+
 EditedRay = qd.types.struct(
-    edit=qd.i32,
+    kind=qd.i32,
     until=qd.f32,
+    place=qd.i32,
     is_continuous=qd.i32,
     resolution=qd.i32,
     first=qd.i32,
-    part=qd.i32,
-    under=qd.i32,
-    inner=vec2,
-    outer=vec2,
-    canonical=vec3,
+    start=vec3,
     velocity=vec3,
-    node=vec3,
-    node_velocity=vec3,
 )
-"""A stretch of a ray o + t d in deformed space, in the one simple edit whose box holds it.
+"""A stretch of a ray o + t d in deformed space.
 
-edit: its number, MANY where samples must be mapped one by one, NONE where no edit's box holds the stretch;
-until: the ray parameter at which it ends; is_continuous: 1 where discrete edits
-move none of its samples;
-resolution, first: the edit's lattice, of 0 nodes for a discrete edit; part, under: the places
-(`fields.voxel_layers`) at which samples of V and of a discrete edit's region are read; inner, outer: [t_in,
-t_out] in the inner region and in the outer cage, or the region; canonical + t velocity: the inner region's
-samples in canonical space; node + t node_velocity: the ray in node units of the lattice.
+kind: `IN_PLACE` to `MIXED`; until: the ray parameter at which it ends; place: that at which its samples are
+read (`fields.voxel_layers`), unless they are mapped one by one; is_continuous: 1 where discrete edits move
+none of its samples; resolution, first: the lattice; start + t velocity: the line in canonical space, or in
+node units of the lattice.
 """
-
-NONE, MANY = -2, -1
 
 
 @qd.func
 def edited_ray(t: qd.f32, origin: vec3, d: vec3, edits: EditArgs):
     """The `EditedRay` from t on of a ray with unit direction d."""
-    ray = EditedRay(edit=NONE, until=1e30, is_continuous=1, inner=vec2(1e30, -1e30), outer=vec2(1e30, -1e30))
+    ray = EditedRay(kind=IN_PLACE, until=1e30, is_continuous=1)
     inverse = safe_inverse(d)
-    met = 0
-    e = 0
+    is_found = 0
     for n in range(edits.count):
-        box = slab(
-            origin, inverse, read3(edits.params, n, CHANGED_BOX), read3(edits.params, n, CHANGED_BOX + 3)
-        )
-        if box.x <= box.y and t <= box.y:
-            if t >= box.x:
-                met += 1
-                e = n
-                ray.until = qd.min(ray.until, box.y)
-                if edits.params[n, IS_CUT] > 0.5:
-                    ray.is_continuous = 0
-            else:
-                ray.until = qd.min(ray.until, box.x)
-    if met > 0:
-        ray.edit = MANY
-        if met == 1 and edits.params[e, ALONE] > 0.5:
-            # Earlier edits do not reach where this one takes samples, later ones do not hold them.
-            if edits.params[e, SIMPLE] > 0.5:
-                ray.edit = e
-                ray.resolution = qd.cast(edits.params[e, RESOLUTION], qd.i32)
-                ray.first = first_node(edits.params, e)
-                ray.node = to_nodes(origin, edits.params, e)
-                ray.node_velocity = times(edits.params, e, TO_NODES + 3, d)
-                ray.outer = slab(
-                    ray.node,
-                    safe_inverse(ray.node_velocity),
+        e = edits.count - 1 - n
+        if is_found == 0 and edits.params[e, STILL] < 0.5:
+            box = slab(
+                origin, inverse, read3(edits.params, e, CHANGED_BOX), read3(edits.params, e, CHANGED_BOX + 3)
+            )
+            if box.x <= box.y and t <= box.y:
+                if t < box.x:
+                    ray.until = qd.min(ray.until, box.x)
+                else:
+                    ray.until = qd.min(ray.until, box.y)
+                    is_found = enter(ray, t, origin, d, edits, e)
+    return ray
+
+
+@qd.func
+def enter(ray: qd.template(), t: qd.f32, origin: vec3, d: vec3, edits: EditArgs, e: qd.i32):
+    """1 where edit e, in whose box the ray is at t, maps its samples: the stretch becomes its own; else 0."""
+    is_found = 0
+    is_simple = edits.params[e, SIMPLE] > 0.5
+    is_alone = edits.params[e, ALONE] > 0.5
+    base = qd.cast(edits.params[e, BASE_PLACE], qd.i32)
+    if is_simple or is_straight(edits.params, e):
+        if edits.params[e, FIRST] < 0.5:
+            inner, at = through(origin, d, edits.params, e, RECORDS)
+            if t >= inner.x and t <= inner.y:
+                is_found = 1
+                ray.until = qd.min(ray.until, inner.y)
+                ray.place = qd.cast(edits.params[e, PART_PLACE], qd.i32)
+                if ray.place == 0:
+                    ray.place = base
+                if is_alone or edits.params[e, PART_PLACE] != 0.0:
+                    ray.kind = LINE
+                    ray.start, ray.velocity = image(at, d, edits.params, e, RECORDS)
+                else:
+                    ray.kind = MIXED
+            elif t < inner.x and inner.x <= inner.y:
+                ray.until = qd.min(ray.until, inner.x)
+        if is_found == 0 and edits.params[e, LAST] > 1.5:
+            start = origin
+            velocity = d
+            outer = qd.math.vec2(0.0, 0.0)
+            if is_simple:
+                start = to_nodes(origin, edits.params, e)
+                velocity = times(edits.params, e, TO_NODES + 3, d)
+                outer = slab(
+                    start,
+                    safe_inverse(velocity),
                     read3(edits.params, e, NODE_BOX),
                     read3(edits.params, e, NODE_BOX + 3),
                 )
-            elif is_straight(edits.params, e):
-                ray.edit = e
-                ray.part = qd.cast(edits.params[e, PART_PLACE], qd.i32)
-                ray.under = qd.cast(edits.params[e, UNDER_PLACE], qd.i32)
-                if edits.params[e, LAST] > 1.5:
-                    ray.outer, _at = through(origin, d, edits.params, e, RECORDS + RECORD)
-        if ray.edit >= 0 and edits.params[e, FIRST] < 0.5:
-            ray.inner, at = through(origin, d, edits.params, e, RECORDS)
-            q, v = image(at, d, edits.params, e, RECORDS)
-            ray.canonical = q
-            ray.velocity = v
-    return ray
+            else:
+                outer, _at = through(origin, d, edits.params, e, RECORDS + RECORD)
+            if t >= outer.x and t <= outer.y:
+                is_found = 1
+                ray.until = qd.min(ray.until, outer.y)
+                if not is_simple:
+                    ray.place = qd.cast(edits.params[e, UNDER_PLACE], qd.i32)
+                elif is_alone:
+                    ray.kind = LATTICE
+                    ray.place = base
+                    ray.resolution = qd.cast(edits.params[e, RESOLUTION], qd.i32)
+                    ray.first = first_node(edits.params, e)
+                    ray.start = start
+                    ray.velocity = velocity
+                else:
+                    ray.kind = MIXED
+            elif t < outer.x and outer.x <= outer.y:
+                ray.until = qd.min(ray.until, outer.x)
+    else:
+        is_found = 1
+        ray.kind = MIXED
+    if ray.kind == MIXED and edits.params[e, IS_CUT] > 0.5:
+        ray.is_continuous = 0
+    return is_found
 
 
 @qd.func
@@ -150,29 +180,20 @@ def map_along(
     """As `map_sample` for p = o + t d on the ray, and how p was moved (`STAYED`, `BENT`, `STRAIGHT`)."""
     q = p
     v = d
-    place = 0
+    place = ray.place
     moved = STAYED
-    if ray.edit >= 0:
-        if t >= ray.inner.x and t <= ray.inner.y:
-            q = ray.canonical + t * ray.velocity
-            v = ray.velocity
-            place = ray.part
-            moved = STRAIGHT
-        elif t >= ray.outer.x and t <= ray.outer.y:
-            if ray.resolution > 0:
-                u, along = displacement(
-                    ray.node + t * ray.node_velocity,
-                    ray.node_velocity,
-                    edits.lattice,
-                    ray.first,
-                    ray.resolution,
-                )
-                q = p + u
-                v = d + along
-                moved = BENT
-            else:
-                place = ray.under
-    elif ray.edit == MANY:
+    if ray.kind == LINE:
+        q = ray.start + t * ray.velocity
+        v = ray.velocity
+        moved = STRAIGHT
+    elif ray.kind == LATTICE:
+        u, along = displacement(
+            ray.start + t * ray.velocity, ray.velocity, edits.lattice, ray.first, ray.resolution
+        )
+        q = p + u
+        v = d + along
+        moved = BENT
+    elif ray.kind == MIXED:
         q, v, place = map_sample(p, d, edits, flows)
         if qd.abs(q - p).max() > 0.0:
             moved = BENT

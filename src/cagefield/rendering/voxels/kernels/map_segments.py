@@ -15,7 +15,7 @@ sample is mapped by itself.
 
 from cagefield.compute.quadrants import qd
 from cagefield.edits.device.kernels.edit_maps import EditArgs
-from cagefield.rendering.voxels.kernels.edited_ray import BENT, MANY, map_along
+from cagefield.rendering.voxels.kernels.edited_ray import BENT, MIXED, map_along
 from cagefield.rendering.voxels.kernels.grid import vec3
 
 SPAN = 5
@@ -63,7 +63,7 @@ def map_in_segments(
     """
     # Stages: 0 and 1 map the ends of a new segment, 2 the sample alone. One call for all, as maps are long.
     stage = 3
-    if ray.edit != MANY or ray.is_continuous == 0:
+    if ray.kind != MIXED or ray.is_continuous == 0:
         stage = 2
         segment.end = -1e30
     elif t > segment.end + END_WIDTH * h:

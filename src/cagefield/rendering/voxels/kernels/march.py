@@ -15,6 +15,7 @@ from cagefield.edits.device.kernels.edit_maps import EditArgs, map_sample
 from cagefield.edits.device.kernels.grade import grade_sample
 from cagefield.rendering.voxels.kernels.edited_ray import (
     BENT,
+    LINE,
     STAYED,
     STRAIGHT,
     EditedRay,
@@ -188,7 +189,7 @@ def march_tiles(
                             if t > ray.until:
                                 ray = edited_ray(t, camera.origin, d, edits)
                                 segment.end = -1e30
-                                if ray.edit >= 0 and ray.inner.x <= ray.inner.y:
+                                if ray.kind == LINE:
                                     turned = sh_basis(ray.velocity / qd.max(ray.velocity.norm(), 1e-20), K)
                             canonical, view, place, moved = map_in_segments(
                                 segment, ray, t, h, camera.origin, d, edits, edited % 2 == 0

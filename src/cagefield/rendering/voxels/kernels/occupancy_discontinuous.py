@@ -16,8 +16,12 @@ from cagefield.rendering.voxels.kernels.grid import (
     uncontract,
     vec3,
 )
-from cagefield.rendering.voxels.kernels.occupancy_queries import MOST_CELLS, is_blocked, is_dense
+from cagefield.rendering.voxels.kernels.occupancy_queries import MOST_CELLS, are_dense, is_blocked, is_dense
 from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs
+
+STILL = 1e-3
+"""Largest difference, in cells, of an image from its point, and of a reach from 1, where a map is the
+identity."""
 
 
 @qd.kernel(fastcache=True)
@@ -65,12 +69,16 @@ def dense_blocks(
         n = scheduled_item(turn, deal)
         if n < out.shape[0]:
             block = ivec3(candidates[3 * n], candidates[3 * n + 1], candidates[3 * n + 2])
+            low = lower + 2 * block
             found = 0
             k = 0
             while k < 27 and found == 0:
-                g = qd.cast(lower + 2 * block + ivec3(k % 3, (k // 3) % 3, k // 9), qd.f32)
+                vertex = low + ivec3(k % 3, (k // 3) % 3, k // 9)
+                g = qd.cast(vertex, qd.f32)
                 image, reach, place = probe(g, grid, edits, contracted, flows)
-                if place >= 0:
+                if place >= 0 and qd.max(qd.abs(image - g), qd.abs(reach - 1.0)).max() <= STILL:
+                    found = are_dense(qd.max(vertex - 1, low), qd.min(vertex + 1, low + 2), place, grid)
+                elif place >= 0:
                     r = qd.min(0.5 * reach, MOST_CELLS) + 1e-3
                     found = is_dense(image, r, place, grid)
                 k += 1

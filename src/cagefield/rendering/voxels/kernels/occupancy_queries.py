@@ -6,7 +6,7 @@ Points and reaches r are in grid coordinates; all of the box [point - r, point +
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
 from cagefield.compute.quadrants import qd
-from cagefield.rendering.voxels.kernels.grid import GridArgs, vec3
+from cagefield.rendering.voxels.kernels.grid import GridArgs, ivec3, vec3
 from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs
 
 MOST_CELLS = 12.0
@@ -49,17 +49,28 @@ def axis_mask(brick: qd.i32, first: qd.i32, last: qd.i32, upper: qd.i32):
 def is_dense(image: vec3, r: vec3, place: qd.i32, grid: GridArgs):
     """1 where a cell within r of an image, grid coordinates, holds density, else 0.
 
-    The place is that of the layer that is searched, 0 for the field. Slices of the grid that the layer does
-    not store may be those of the next layer, or lie past the index, which is not read there.
+    The place is that of the layer that is searched, 0 for the field.
+    """
+    first = qd.cast(qd.floor(image - r), qd.i32)
+    last = qd.cast(qd.floor(image + r), qd.i32) + 1
+    return are_dense(first, last, place, grid)
+
+
+@qd.func
+def are_dense(first: ivec3, last: ivec3, place: qd.i32, grid: GridArgs):
+    """1 where one of the vertices from `first` to `last` holds density in the layer at a place, else 0.
+
+    Slices of the grid that the layer does not store may be those of the next layer, or lie past the index,
+    which is not read there.
     """
     slices = grid.index.shape[0] // (grid.resolution.y * grid.resolution.z)
-    first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)
-    last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, grid.resolution - 1)
+    low = qd.max(first, 0)
+    high = qd.min(last, grid.resolution - 1)
     found = 0
-    x = first.x
-    while x <= qd.min(last.x, slices - 1 - place) and found == 0:
-        for y in range(first.y, last.y + 1):
-            for z in range(first.z, last.z + 1):
+    x = low.x
+    while x <= qd.min(high.x, slices - 1 - place) and found == 0:
+        for y in range(low.y, high.y + 1):
+            for z in range(low.z, high.z + 1):
                 vertex = ((x + place) * grid.resolution.y + y) * grid.resolution.z + z
                 if grid.density[grid.index[vertex]] > 0.0:
                     found = 1
