@@ -19,7 +19,7 @@ from cagefield.rendering.voxels.kernels.grid import (
 from cagefield.rendering.voxels.kernels.occupancy_queries import MOST_CELLS, are_dense, is_blocked, is_dense
 from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs
 
-STILL = 1e-3
+IDENTITY_TOLERANCE = 1e-3
 """Largest difference, in cells, of an image from its point, and of a reach from 1, where a map is the
 identity."""
 
@@ -76,7 +76,7 @@ def dense_blocks(
                 vertex = low + ivec3(k % 3, (k // 3) % 3, k // 9)
                 g = qd.cast(vertex, qd.f32)
                 image, reach, place = probe(g, grid, edits, contracted, flows)
-                if place >= 0 and qd.max(qd.abs(image - g), qd.abs(reach - 1.0)).max() <= STILL:
+                if place >= 0 and qd.max(qd.abs(image - g), qd.abs(reach - 1.0)).max() <= IDENTITY_TOLERANCE:
                     found = are_dense(qd.max(vertex - 1, low), qd.min(vertex + 1, low + 2), place, grid)
                 elif place >= 0:
                     r = qd.min(0.5 * reach, MOST_CELLS) + 1e-3
