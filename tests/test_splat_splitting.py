@@ -127,6 +127,23 @@ def test_what_is_twisted_about_its_middle_is_split() -> None:
     assert len(split_for_edits(flat, EditStack([BENDS["twist"]])).field) > 3
 
 
+def test_small_splats_bend_further_than_large_ones_before_they_are_split() -> None:
+    bend = BENDS["bend"]
+    size = float(np.linalg.norm(np.ptp(np.concatenate([bend.boxes, bend.inner.aabb[None]]), axis=(0, 1))))
+
+    def children(share: float, stronger: float) -> int:
+        A = np.diag([1.0, 0.1, 0.1])[None] * share * size
+        change = np.array([[stronger * split_children.BEND, 0.0, 0.0]])
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(split_children, "_bend", lambda *_: change)
+            rows = np.array([0])
+            return len(split_children.bent_children(bend, rod(), rows, np.zeros((1, 3)), A, size, None).x)
+
+    assert children(split_children.SMALL_BEND, 1.1) > 0
+    assert children(split_children.SMALL_BEND / 2, 1.9) == 0
+    assert children(split_children.SMALL_BEND / 2, 2.2) > 0
+
+
 def test_children_that_are_not_drawn_are_not_made() -> None:
     split = split_for_edits(rod(), EditStack([BENDS["bend"]])).field
     assert split.opacities.min() > 1.0 / 255.0

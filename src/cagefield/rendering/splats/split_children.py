@@ -30,7 +30,11 @@ from cagefield.warps.interfaces import Warp
 BEND = 0.08
 """Largest b of a splat that stays whole: a turn by 9 degrees from its middle to two standard deviations."""
 
-SHADE = 0.15
+SMALL_BEND = 0.015
+"""Splats whose largest standard deviation is below this share of an edit's size may bend more, as much as
+they are smaller: at two standard deviations they are off by 2 pixels of 800 that the edit fills."""
+
+SHADE = 0.2
 """Largest d of a splat that stays whole."""
 
 FAINT = 0.3
@@ -83,12 +87,15 @@ def bent_children(
     rows: NDArray[np.int64],
     points: Array,
     A: Array,
+    size: float,
     proceed: Callable[[], None] | None,
 ) -> Children:
-    """Rows of children for the splats over which the map of an edit bends."""
+    """Rows of children for the splats over which the map of an edit of a size, world units, bends."""
     warp = edit.exact_warp
     parts = map_parts(lambda part: _bend(warp, points[part], A[part], proceed), len(rows), PART_SPLATS)
-    return _rows(field, rows, np.concatenate(parts), BEND)
+    largest = np.linalg.norm(A, axis=1).max(axis=1)
+    weight = np.minimum(1.0, largest / (SMALL_BEND * size))
+    return _rows(field, rows, np.concatenate(parts) * weight[:, None], BEND)
 
 
 def _bend(warp: Warp, points: Array, A: Array, proceed: Callable[[], None] | None) -> Array:

@@ -16,7 +16,8 @@ F(m) + J A z, which is right as far as F is affine over it, and in one color. Th
   b_i is the largest of them. Where b_i > BEND the splat becomes a row of narrower ones along a_i: N(0, 1) is
   the convolution of N(0, r^2) and N(0, 1 - r^2), so children of the standard deviation r at distances of
   SPACING r, weighted by N(0, 1 - r^2), add up to it, but for a ripple of 2 exp(-2 (pi / SPACING)^2) = 0.1 %.
-  With r = BEND / b_i they bend by BEND at most: b is proportional to the width. It is not where J jumps, on
+  With r = BEND / b_i they bend by BEND at most: b is proportional to the width. Of small splats b counts less
+  (`split_children.SMALL_BEND`). It is not where J jumps, on
   the faces of cages, and splats across these are split ROUNDS times. Opacities are such that
   the ray through the middle of each child loses as much in the row as it lost in the splat there. Optical
   depths add up, and
@@ -64,7 +65,7 @@ from cagefield.rendering.splats.split_children import (
     shaded_children,
     splat_axes,
 )
-from cagefield.typing import Mask
+from cagefield.typing import Array, Mask
 
 ROUNDS = 3
 """Rounds in which split splats are examined again."""
@@ -237,7 +238,7 @@ def _split_once(
             lit = shaded_children(edit, step.patch, field, rows[whole], points[whole], A[whole])
             children = concatenate_children([children, lit])
     else:
-        children = bent_children(edit, field, rows, points, A, proceed)
+        children = bent_children(edit, field, rows, points, A, _size(step), proceed)
     return _parted(splats, children, room) if len(children.parent) else None
 
 
@@ -247,11 +248,10 @@ def _near(
     """Which splats in their own places [.], and which of those that moved [.], an edit may have to split."""
     from cagefield.rendering.splats.kernels.deformation import within_reach, within_reach_at_rest
 
-    boxes = np.concatenate([step.boxes, step.edit.inner.aabb[None]])
-    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    low, high = _bounds(step)
     # Stretches are Frobenius' norms, that of nothing is sqrt(3).
     is_cut = isinstance(step.edit, Discrete)
-    least = 0.0 if is_cut else _UNSTRETCHED * SMALL * float(np.linalg.norm(high - low))
+    least = 0.0 if is_cut else _UNSTRETCHED * SMALL * _size(step)
     rest, elsewhere = np.empty(len(field), bool), np.empty(len(moved.source), bool)
     scales = field.log_scales
     within_reach_at_rest(field.means, moved.left, scales, low, high, REACH, least, _UNSTRETCHED, rest)
@@ -259,6 +259,18 @@ def _near(
         stretch = np.linalg.norm(moved.jacobian, axis=(1, 2))
         within_reach(moved.points, moved.source, scales, low, high, REACH, least, stretch, elsewhere)
     return np.flatnonzero(rest), np.flatnonzero(elsewhere)
+
+
+def _bounds(step: PreparedEdit) -> tuple[Array, Array]:
+    """(least [3], largest [3]) coordinates of what an edit changes, and of its inner cage."""
+    boxes = np.concatenate([step.boxes, step.edit.inner.aabb[None]])
+    return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+
+
+def _size(step: PreparedEdit) -> float:
+    """Diagonal of `_bounds`, world units."""
+    low, high = _bounds(step)
+    return float(np.linalg.norm(high - low))
 
 
 _UNSTRETCHED = float(np.sqrt(3.0))
