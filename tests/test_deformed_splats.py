@@ -17,6 +17,7 @@ from cagefield.completion.splat_patch import build_splat_patch
 from cagefield.edits import Edit, EditStack, Flow, PreparedEdit, PreparedStack, Trilinear
 from cagefield.errors import EditError
 from cagefield.fields.splat_field import SplatField
+from cagefield.geometry import hexahedron
 from cagefield.geometry.cage import Cage, rotation_matrix
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.splats.kernels.deformation import polar_rotation
@@ -451,3 +452,25 @@ def test_a_field_without_splats():
     field = random_splats(3).take(np.zeros(0, int))
     for name in ("rotate", "copy", "delete"):
         assert len(deformed_splats(field, EditStack(EDITS[name]))) == 0
+
+
+@pytest.mark.parametrize("is_turned", [False, True])
+def test_regions_of_straight_cages_are_those_of_the_reference(is_turned: bool) -> None:
+    """Corners, points on faces and beside them, inside and outside: the same region, to rounding the same."""
+    inner = Cage.box((3.1, -0.2, 0.4), (0.5, 0.7, 0.3))
+    if is_turned:
+        inner = inner.rotate((0.3, -0.5, 0.2))
+    edit = Edit.continuous(inner, inner.grown(0.4)).translate((0.05, 0.02, -0.1)).rotate((0.1, 0.0, 0.2))
+    rng = np.random.default_rng(0)
+    u = np.concatenate([hexahedron.BITS, rng.uniform(-0.6, 1.6, (3000, 3)), rng.uniform(0, 1, (600, 3))])
+    u[-600:][np.arange(600), rng.integers(0, 3, 600)] = rng.choice([0.0, 1.0, -1e-9, 1.0 + 1e-9], 600)
+    points = np.concatenate([hexahedron.points(cage.corners, u) for cage in (edit.inner, edit.outer)])
+    found, expected = forward.to_deformed(edit.exact_warp, points), edit.exact_warp.to_deformed(points)
+    in_outer, in_inner = edit.outer.contains(points), edit.inner.contains(points)
+    assert 500 < in_inner.sum() < in_outer.sum() < len(points) - 500
+    np.testing.assert_array_equal(found.points[~in_outer], points[~in_outer])
+    np.testing.assert_array_equal(found.jacobian[~in_outer], expected.jacobian[~in_outer])
+    np.testing.assert_allclose(found.points[in_inner], expected.points[in_inner], atol=1e-12)
+    np.testing.assert_allclose(found.jacobian[in_inner], expected.jacobian[in_inner], atol=1e-12)
+    # The shell's steps are those of float32.
+    np.testing.assert_allclose(found.points, expected.points, atol=1e-5)

@@ -75,8 +75,7 @@ def inverse(corners: Array, targets: Array) -> tuple[Array, Mask]:
     C = coefficients(corners)
     W = center_inverse(C)
     y = (targets - C[0]) @ W.T
-    rounding = np.finfo(np.float64).eps * np.abs(corners).max() * np.abs(W).sum(axis=1).max()
-    on_face = _ON_FACE + 100.0 * rounding
+    on_face = face_tolerance(corners, W)
     K = C[[3, 5, 6, 7]] @ W.T  # y = xi + K0 xi eta + K1 xi zeta + K2 eta zeta + K3 xi eta zeta
     if np.abs(K).max() < 1e-14:  # a parallelepiped up to rounding
         xi = np.where(np.abs(y) <= 1.0 + on_face, y.clip(-1.0, 1.0), y)
@@ -98,6 +97,12 @@ def inverse(corners: Array, targets: Array) -> tuple[Array, Mask]:
     u, mask = np.full(targets.shape, np.nan), np.zeros(len(targets), dtype=bool)
     u[rows], mask[rows] = 0.5 * (xi + 1.0), found
     return u, mask
+
+
+def face_tolerance(corners: Array, W: Array) -> float:
+    """Excess of |xi| over 1 up to which a point is on a face; W [3,3] as `center_inverse` returns it."""
+    rounding = np.finfo(np.float64).eps * np.abs(corners).max() * np.abs(W).sum(axis=1).max()
+    return float(_ON_FACE + 100.0 * rounding)
 
 
 def center_inverse(C: Array) -> Array:

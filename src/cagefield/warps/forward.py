@@ -14,12 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cagefield.geometry import hexahedron
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.flow_table import table_along
 from cagefield.warps.free_form import FreeFormFlow
-from cagefield.warps.interfaces import Mapped, Warp
+from cagefield.warps.interfaces import Mapped, Shell, Warp
 
 COARSE_STRAIN = 1.0
 """Strain of a step (see `FlowShell`) while something moves: as for lattices of 32^3 nodes.
@@ -45,11 +47,13 @@ def to_deformed(
     elif isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FreeFormFlow):
         flow = warp.shell.with_strain(COARSE_STRAIN) if coarse else warp.shell
         warp = replace(warp, shell=_FreeFormForward(flow))
+    regions = _AffineRegions.of_warp(warp)
     parts = []
     for first in range(0, max(len(points), 1), POINTS_PER_STEP):
         if proceed is not None:
             proceed()
-        parts.append(warp.to_deformed(points[first : first + POINTS_PER_STEP]))
+        part = points[first : first + POINTS_PER_STEP]
+        parts.append(warp.to_deformed(part) if regions is None else regions.to_deformed(part))
     if len(parts) == 1:
         return parts[0]
     return Mapped(
@@ -58,6 +62,55 @@ def to_deformed(
         np.concatenate([part.lost for part in parts]),
         np.concatenate([part.inside for part in parts]),
     )
+
+
+@dataclass(frozen=True)
+class _AffineRegions:
+    """A continuous warp whose cages are parallelepipeds, mapped region by region by a kernel.
+
+    outer, inner: frames [3,4] of the canonical cages, and the map [3,4] of the inner one, as
+    `kernels.affine_regions` takes them.
+    """
+
+    shell: Shell
+    outer: Array
+    inner: Array
+    map_of_inner: Array
+
+    @classmethod
+    def of_warp(cls, warp: Warp) -> _AffineRegions | None:
+        """The regions of a warp, None where one of its cages or its inner map is bent."""
+        if not isinstance(warp, ContinuousWarp) or warp.hexahedra is None:
+            return None
+        onto = warp.hexahedra.inverse
+        if onto.affine is None or not (warp.outer.is_affine and onto.deformed.is_affine):
+            return None
+        A, b = onto.affine
+        return cls(warp.shell, _frame(warp.outer), _frame(onto.deformed), np.column_stack([A, b]))
+
+    def to_deformed(self, points: Array) -> Mapped:
+        """As `ContinuousWarp.to_deformed`."""
+        from cagefield.warps.kernels.affine_regions import SHELL, map_regions
+
+        count = len(points)
+        images, jacobian = np.empty((count, 3)), np.empty((count, 3, 3))
+        region = np.empty(count, np.uint8)
+        frames = (self.outer, self.inner, self.map_of_inner)
+        map_regions(np.ascontiguousarray(points), *frames, images, jacobian, region)
+        mapped = Mapped(images, jacobian, *np.zeros((2, count), dtype=bool))
+        rest = np.flatnonzero(region == SHELL)
+        if len(rest):
+            mapped.put(rest, *self.shell.to_deformed(points[rest]))
+        return mapped
+
+
+def _frame(cage: Cage) -> Array:
+    """W, c [3,4] with |W p + c| <= 1 in a cage that is a parallelepiped, its faces as `Cage.contains` has
+    them."""
+    C = hexahedron.coefficients(cage.corners)
+    W = hexahedron.center_inverse(C)
+    most = 1.0 + hexahedron.face_tolerance(cage.corners, W)
+    return np.column_stack([W, -W @ C[0]]) / most
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,7 +153,7 @@ class MovedSplats:
         if len(elsewhere):
             in_boxes(self.points, reach, elsewhere)
         still, near = np.flatnonzero(at_rest & ~self.left), np.flatnonzero(elsewhere)
-        points = np.concatenate([means[still].astype(np.float64), self.points[near]])
+        points = _joined(means[still].astype(np.float64), self.points[near])
         mapped = to_deformed(warp, points, coarse=coarse, proceed=proceed)
         moves = np.empty(len(points), bool)
         changes(points, mapped.points, mapped.jacobian, moves)
@@ -187,9 +188,9 @@ class MovedSplats:
             grade = SampleGrade.concatenate([known.take(stays), arrived])
         moved = MovedSplats(
             left,
-            np.concatenate([self.source[stays], np.concatenate([still, self.source[near]])[come]]),
-            np.concatenate([self.points[stays], mapped.points[come]]),
-            np.concatenate([self.jacobian[stays], jacobian]),
+            _joined(self.source[stays], _joined(still, self.source[near])[come]),
+            _joined(self.points[stays], mapped.points[come]),
+            _joined(self.jacobian[stays], jacobian),
             gains,
             grade,
         )
@@ -233,6 +234,13 @@ class MovedSplats:
             fresh = SampleGrade.neutral(len(source) - len(known.density))
             grade = SampleGrade.concatenate([known, fresh])
         return MovedSplats(left, source, points, jacobian, gains, grade)
+
+
+def _joined(first: NDArray[Any], last: NDArray[Any]) -> NDArray[Any]:
+    """The rows of both, without a copy where one has none."""
+    if not len(first) or not len(last):
+        return last if len(last) else first
+    return np.concatenate([first, last])
 
 
 def changed_sh(
