@@ -76,8 +76,9 @@ def _block(splats: int) -> Reader:
         (folder / "block-0001.json").write_text(json.dumps(record), encoding="utf-8")
 
     def read(folder: Path) -> None:
+        from cagefield.training.splats.block_files import read_block
         from cagefield.training.splats.splat_config import SplatConfig
-        from cagefield.training.splats.train_blocks import BlockJob, read_block
+        from cagefield.training.splats.train_blocks import BlockJob
 
         dataset: Any = SimpleNamespace(train=(None,) * 40)
         read_block(BlockJob(0, dataset, SplatConfig(), folder, "known"))

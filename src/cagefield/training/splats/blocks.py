@@ -81,6 +81,10 @@ class Block:
         """Mask [N] of positions [N,3] in the region and not far."""
         return self._near(inside_cell(self.region, positions), positions)
 
+    def is_far(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """Mask [N] of positions [N,3] that are far, in whichever core."""
+        return ~self._near(np.ones(len(positions), bool), positions)
+
     def _near(self, mask: NDArray[np.bool_], positions: NDArray[np.floating]) -> NDArray[np.bool_]:
         if self.cameras is not None:
             rows = np.flatnonzero(mask)
