@@ -12,7 +12,7 @@ from cagefield.datasets.views import Dataset, SparsePoints
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.training.splats import train_blocks as training
-from cagefield.training.splats.block_files import read_block, read_copies
+from cagefield.training.splats.block_jobs import BlockJob, read_block, read_copies
 from cagefield.training.splats.blocks import (
     FAR_DEPTHS,
     MIN_BLOCK_POINTS,
@@ -292,7 +292,7 @@ def test_finished_blocks_are_not_trained_again(
         path.unlink()
     began: list[str] = []
 
-    def counted(job: training.BlockJob, on_stage: object = None) -> bool:
+    def counted(job: BlockJob, on_stage: object = None) -> bool:
         began.append(job.name)
         return train_block(job)
 

@@ -30,11 +30,10 @@ from cagefield.datasets.views import Dataset, View
 from cagefield.fields.splat_field import SplatField
 from cagefield.images.image_files import side_by_side, write_png
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
-from cagefield.training.splats.block_files import read_block
+from cagefield.training.splats.block_jobs import BlockJob, read_block
 from cagefield.training.splats.blocks import Block, divide, left_out, visible_points
 from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.training.splats.train_blocks import (
-    BlockJob,
     plan_blocks,
     train_block,
     train_blocks,

@@ -8,8 +8,8 @@ show it leave it as it is. Blocks meet in no other way, so that many machines re
 Where the surroundings of a block are frozen instead, several blocks correct one error of a photo at once, as
 if each were alone, and far content, which no block may move, keeps the detail of the scaffold.
 
-Notation: owner of a splat, the block whose core contained it after the first trainings, or FAR; row, its
-number among the owner's splats.
+Notation: owner of a splat, the block whose core contained it after the first trainings, or FAR_OWNER; row,
+its number among the owner's splats.
 
 Source: one round of federated averaging (McMahan et al. 2017), with splats as in the consensus of blocks of
 DOGS (Chen and Lee 2024).
@@ -41,8 +41,11 @@ from cagefield.training.splats.splat_state import SplatState
 if TYPE_CHECKING:
     from cagefield.typing import Array
 
-FAR = -1
+FAR_OWNER = -1
 """Owner of the scaffold's far splats."""
+
+REFINEMENT_START_PROGRESS = 0.6
+"""Progress of a training, in its learning rate and resolution, at which a refinement begins."""
 
 _KIND, _VERSION = "SplatCopies", "1"
 _NUMBERS = ("owners", "rows", "visits")
@@ -54,7 +57,7 @@ class Copies:
 
     Attributes:
         field: N splats.
-        owners: [N] number of the block of each, or FAR.
+        owners: [N] number of the block of each, or FAR_OWNER.
         rows: [N] row of each among its owner's splats.
         visits: [N] steps that each has taken.
     """

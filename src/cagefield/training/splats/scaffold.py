@@ -2,7 +2,7 @@
 
 The scaffold is trained on all photos at a reduced size. It gives each block the photos' exposure gains and
 frozen splats for the content outside the block, and the merged field the content that is far from all
-cameras, which no block sees from enough places.
+cameras, which no block sees from enough places; the blocks' photos refine it (`refinement`).
 
 Source: the coarse scaffold of Hierarchical 3D Gaussians (Kerbl et al. 2024, section 5).
 """

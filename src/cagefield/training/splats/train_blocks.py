@@ -16,7 +16,7 @@ import dataclasses
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -28,7 +28,8 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.training.evaluation import evaluate_views
 from cagefield.training.result import TrainResult
-from cagefield.training.splats.block_files import (
+from cagefield.training.splats.block_jobs import (
+    BlockJob,
     TrainedBlock,
     read_block,
     read_copies,
@@ -36,96 +37,19 @@ from cagefield.training.splats.block_files import (
     write_block,
 )
 from cagefield.training.splats.blocks import Block, block_dataset, concatenate, divide, merge
-from cagefield.training.splats.refinement import FAR, Copies, consensus, shared_copies, train_copies
+from cagefield.training.splats.refinement import FAR_OWNER, consensus, train_copies
 from cagefield.training.splats.scaffold import (
     MIN_SPLATS,
-    Context,
     scaffold_config,
     scaffold_dataset,
-    visible_splats,
 )
 from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.training.splats.train_splats import train_splat
 
 REFINEMENT_STEPS_SHARE = 0.25
 """Steps of a block's refinement, as a share of the block's."""
-REFINEMENT_START_PROGRESS = 0.6
-"""Progress of a training, in its learning rate and resolution, at which a refinement begins."""
 
 OnStage = Callable[[str, float, str], None]
-
-
-@dataclass(frozen=True)
-class BlockJob:
-    """One block's training: photos and points, options with its own steps, and the files it writes.
-
-    `key` is a digest of everything that the result depends on. The training of the scaffold has number -1
-    and no `block`; without a `scaffold` the block is the whole capture. A refinement has the `first` training
-    of its block, and those of its neighbors, of which only the files are read.
-    """
-
-    number: int
-    dataset: Dataset
-    config: SplatConfig
-    folder: Path
-    key: str
-    block: Block | None = None
-    scaffold: BlockJob | None = None
-    first: BlockJob | None = None
-    neighbors: tuple[BlockJob, ...] = ()
-
-    @property
-    def name(self) -> str:
-        """Name of the training in messages; blocks count from 1."""
-        name = "scaffold" if self.number < 0 else f"block {self.number + 1}"
-        return name if self.first is None else f"{name}, refinement"
-
-    @property
-    def photo_count(self) -> int:
-        """Number of the training's photos."""
-        return len(self.dataset.train if self.block is None else self.block.photos)
-
-    def path(self, suffix: str) -> Path:
-        """A file of the block in the folder."""
-        kind = "block" if self.first is None else "refined"
-        stem = "scaffold" if self.number < 0 else f"{kind}-{self.number + 1:04d}"
-        return self.folder / f"{stem}{suffix}"
-
-    def context(self) -> Context | None:
-        """Surroundings from the finished scaffold, for a refinement also from the neighbors; None without.
-
-        Raises:
-            CagefieldError: one of them is not finished, damaged, or of another training.
-        """
-        if self.scaffold is None or self.block is None:
-            return None
-        coarse = read_finished(self.scaffold)
-        gains = coarse.gains[list(self.block.photos)]
-        cameras = [view.camera for view in self.dataset.train]
-        if self.first is None:
-            outside = coarse.field.take(~self.block.trains(coarse.field.means))
-            return Context(visible_splats(outside, cameras), gains, self.block)
-        inside = self.block.is_far(coarse.field.means) | self.block.contains(coarse.field.means)
-        for job in self.neighbors:
-            inside |= job.block is not None and job.block.contains(coarse.field.means)
-        frozen = visible_splats(coarse.field.take(~inside), cameras)
-        return Context(frozen, gains, start_progress=REFINEMENT_START_PROGRESS)
-
-    def copies(self) -> Copies | None:
-        """Splats of a refinement: those of the first trainings and far ones; None of another training.
-
-        Raises:
-            CagefieldError: one of them is not finished, damaged, or of another training.
-        """
-        if self.first is None or self.block is None or self.scaffold is None:
-            return None
-        coarse = read_finished(self.scaffold).field
-        fields = {self.number: self.block.own(read_finished(self.first).field)}
-        for job in self.neighbors:
-            if job.block is not None:
-                fields[job.number] = job.block.own(read_finished(job).field)
-        fields[FAR] = coarse.take(self.block.is_far(coarse.means))
-        return shared_copies(fields, self.number, [view.camera for view in self.dataset.train])
 
 
 Trainer = Callable[[Sequence[BlockJob]], Iterable[BlockJob]]
@@ -285,7 +209,7 @@ def _merged(
     for number in there:
         sharing = [job for job in refined if number in {job.number, *(near.number for near in job.neighbors)}]
         fields.append(consensus(number, blocks[number].own(first[number].field), map(read_copies, sharing)))
-    backdrop = consensus(FAR, coarse.take(far), map(read_copies, refined))
+    backdrop = consensus(FAR_OWNER, coarse.take(far), map(read_copies, refined))
     near = merge([blocks[n] for n in there], fields, coarse.take(~far))
     return concatenate([near, backdrop])
 
