@@ -185,6 +185,13 @@ def test_a_refinement_keeps_its_rows_and_counts_its_steps(capture: Dataset, tmp_
     np.testing.assert_array_equal(after.field.means[still], before.field.means[still])
     assert (after.field.sh[moved] != before.field.sh[moved]).any(axis=(1, 2)).mean() > 0.9
     assert not list(tmp_path.glob("*.training"))
+    # a kill amid the removal of the files leaves some: the refinement is not finished
+    for kind in (".copies", ".safetensors", ".json"):
+        kept = jobs[0].path(kind).read_bytes()
+        jobs[0].path(kind).unlink()
+        assert read_block(jobs[0]) is None
+        jobs[0].path(kind).write_bytes(kept)
+    assert read_block(jobs[0]) is not None
 
 
 def _in_margin(view: View, mean: np.ndarray) -> bool:

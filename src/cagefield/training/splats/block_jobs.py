@@ -127,13 +127,14 @@ def write_block(
 
 
 def read_block(job: BlockJob) -> TrainedBlock | None:
-    """A finished block from its files, None where it is not finished.
+    """A finished block from its files, None where it is not finished or one of them is missing.
 
     Raises:
         CagefieldError: damaged files, and those of another training.
     """
     path = job.path(".json")
-    if not path.exists():
+    kinds = (".json", ".safetensors") if job.first is None else (".json", ".safetensors", ".copies")
+    if not all(job.path(kind).exists() for kind in kinds):
         return None
     try:
         with open_regular(path) as file:
