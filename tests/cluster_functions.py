@@ -16,7 +16,8 @@ from cagefield.cluster.frame_tasks import FrameJob, FrameResult, render_frame
 from cagefield.errors import CagefieldError
 from cagefield.files.atomic import replaced_file
 from cagefield.images.pictures import DepthScale, Pictures, write_pictures
-from cagefield.training.splats.train_blocks import BlockJob, train_block
+from cagefield.training.splats.block_jobs import BlockJob
+from cagefield.training.splats.train_blocks import train_block
 
 KILL_STEP = 12
 """Step of a training at which its worker is killed."""

@@ -79,3 +79,21 @@ def points_near(field: SplatField, far: float = 0.03, count: int = 120) -> Spars
     chance = np.random.default_rng(2)
     means = field.means[:: max(1, len(field) // count)]
     return SparsePoints(means + far * chance.normal(size=means.shape), np.full(means.shape, 128, np.uint8))
+
+
+def ring_capture(folder: Path) -> Dataset:
+    """Twelve photos of a painted ball, two of them for tests, with points that all photos may see."""
+    ball, cameras = painted_ball(), around(12, 0.4, 48)
+    views = write_views(folder, cameras, photos_of(ball, cameras))
+    return as_dataset(Path("ball"), views[2:], views[:2], points_near(ball), unbounded=True)
+
+
+def points_along_x(dataset: Dataset, seed: int = 3) -> SparsePoints:
+    """Points along x, each seen by the photos whose number is near its place; one photo sees few of them."""
+    chance = np.random.default_rng(seed)
+    x = chance.uniform(0, len(dataset.train), 400)
+    positions = np.stack([x, chance.normal(0, 0.2, 400), chance.normal(0, 0.2, 400)], axis=1)
+    names = [view.name for view in dataset.train]
+    seen = [frozenset(name for n, name in enumerate(names) if abs(n + 0.5 - at) < 1.2 and n != 4) for at in x]
+    seen[0] |= {names[4]}
+    return SparsePoints(positions, np.zeros((400, 3), np.uint8), tuple(seen))

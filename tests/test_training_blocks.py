@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cagefield.datasets.views import Dataset, SparsePoints, View
+from cagefield.datasets.views import Dataset, SparsePoints
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.training.splats import train_blocks as training
+from cagefield.training.splats.block_jobs import BlockJob, read_block, read_copies
 from cagefield.training.splats.blocks import (
     FAR_DEPTHS,
     MIN_BLOCK_POINTS,
@@ -27,30 +27,25 @@ from cagefield.training.splats.blocks import (
     partition,
     visible_points,
 )
+from cagefield.training.splats.refinement import consensus
 from cagefield.training.splats.scaffold import scaffold_dataset
 from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.training.splats.splat_run import SplatRun
 from cagefield.training.splats.train_blocks import (
-    REFINEMENT_START_PROGRESS,
     plan_blocks,
-    read_block,
     train_block,
     train_blocks,
     training_stages,
 )
 from cagefield.training.splats.train_splats import train_splat
-from splat_captures import around, as_dataset, painted_ball, photos_of, points_near, write_views
+from splat_captures import painted_ball, points_along_x, ring_capture
 
 QUICK = SplatConfig(steps=60, splats=400)
 
 
 @pytest.fixture(scope="module")
 def capture(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    """Twelve photos of a painted ball, two of them for tests, with points that all photos may see."""
-    ball, cameras = painted_ball(), around(12, 0.4, 48)
-    views = write_views(tmp_path_factory.mktemp("blocks"), cameras, photos_of(ball, cameras))
-    points = points_near(ball)
-    return as_dataset(Path("ball"), views[2:], views[:2], points, unbounded=True)
+    return ring_capture(tmp_path_factory.mktemp("blocks"))
 
 
 def uneven_points(count: int = 600) -> np.ndarray:
@@ -84,20 +79,9 @@ def test_far_positions_are_in_the_nearest_core() -> None:
     np.testing.assert_allclose(mine, distances.min(axis=0), atol=1e-9)
 
 
-def street(dataset: Dataset, seed: int = 3) -> SparsePoints:
-    """Points along x, each seen by the photos whose number is near its place; one photo sees few of them."""
-    chance = np.random.default_rng(seed)
-    x = chance.uniform(0, len(dataset.train), 400)
-    positions = np.stack([x, chance.normal(0, 0.2, 400), chance.normal(0, 0.2, 400)], axis=1)
-    names = [view.name for view in dataset.train]
-    seen = [frozenset(name for n, name in enumerate(names) if abs(n + 0.5 - at) < 1.2 and n != 4) for at in x]
-    seen[0] |= {names[4]}
-    return SparsePoints(positions, np.zeros((400, 3), np.uint8), tuple(seen))
-
-
 def test_photos_that_see_enough_of_a_block_are_chosen(capture: Dataset) -> None:
     """Oracle: counts by loops over points and names, and the nearest photos of each point by sorting."""
-    points = street(capture)
+    points = points_along_x(capture)
     blocks = divide(capture, points, 3)
     chosen: dict[int, set[int]] = {n: set() for n in range(3)}
     origins = {view.name: view.camera.origin for view in capture.train}
@@ -200,7 +184,7 @@ def test_merged_splats_are_those_that_blocks_contain_and_the_scaffolds_elsewhere
 
 def test_far_content_is_in_no_block(capture: Dataset) -> None:
     """Oracle: the nearest camera, the median distance of points from the photos that see them, by loops."""
-    points = street(capture)
+    points = points_along_x(capture)
     blocks = divide(capture, points, 3)
     origins = {view.name: view.camera.origin for view in capture.train}
     pairs = zip(points.positions, points.seen_by, strict=True)
@@ -215,7 +199,7 @@ def test_far_content_is_in_no_block(capture: Dataset) -> None:
 
 def test_blocks_have_equal_shares_of_the_photos_points(capture: Dataset) -> None:
     """Each photo weighs 1: points that one photo sees of thousands do not draw the planes to them."""
-    points = street(capture)
+    points = points_along_x(capture)
     chance = np.random.default_rng(5)
     many = chance.normal((40.0, 0, 0), 0.5, (4000, 3))
     name = capture.train[7].name
@@ -233,7 +217,7 @@ def test_a_block_is_trained_among_frozen_splats_of_the_scaffold(capture: Dataset
     blocks, last = plan_blocks(capture, QUICK, 2, tmp_path)
     (scaffold,), jobs, refinements = training_stages(last)
     assert refinements == last and scaffold is jobs[0].scaffold is jobs[1].scaffold
-    assert jobs[0].seeds() is None
+    assert jobs[0].copies() is None
     assert (scaffold.config.steps, scaffold.config.splats) == (18, 100)
     with pytest.raises(CagefieldError, match=r"scaffold\.safetensors is not there; the folder must be"):
         jobs[0].context()
@@ -255,62 +239,6 @@ def test_a_block_is_trained_among_frozen_splats_of_the_scaffold(capture: Dataset
     np.testing.assert_array_equal(run.gains, context.gains)
     assert len(run.field()) == len(run.state) - frozen <= jobs[0].config.splats
     assert np.isfinite(run.running_loss)
-
-
-def test_a_refinement_begins_with_the_blocks_own_splats_among_its_neighbors(
-    capture: Dataset, tmp_path: Path
-) -> None:
-    """Three blocks along x; those at the ends share no photos. Fields and scaffold are random splats."""
-    points = street(capture)
-    seen = dataclasses.replace(capture, points=points)
-    blocks, jobs = plan_blocks(seen, QUICK, 3, tmp_path)
-    photos = [set(block.photos) for block in blocks]
-    assert photos[0] & photos[1] and photos[1] & photos[2] and not photos[0] & photos[2]
-    assert [[job.number for job in refined.neighbors] for refined in jobs] == [[1], [0, 2], [1]]
-    (scaffold,), first, _ = training_stages(jobs)
-    assert [job.config.steps + last.config.steps for job, last in zip(first, jobs, strict=True)] == [
-        round(60 * len(block.photos) / len(capture.train)) for block in blocks
-    ]
-    chance, fields = np.random.default_rng(2), []
-    with pytest.raises(CagefieldError, match=r"block-0001\.safetensors is not there"):
-        jobs[0].seeds()
-    for job in (scaffold, *first):
-        ball = painted_ball(300)
-        low, high = points.positions.min(axis=0), points.positions.max(axis=0)
-        means = chance.uniform(low, high, (len(ball), 3)).astype(np.float32)
-        fields.append(dataclasses.replace(ball, means=means, bounds=ball.bounds))
-        fields[-1].save(job.path(".safetensors"))
-        gains = chance.uniform(0.8, 1.2, (job.photo_count, 3)).astype(np.float32)
-        record = {"key": job.key, "steps": 3, "seconds": 1.0, "gains": gains.tolist()}
-        job.path(".json").write_text(json.dumps(record), encoding="utf-8")
-    context, seeds = jobs[0].context(), jobs[0].seeds()
-    assert context is not None and seeds is not None
-    np.testing.assert_array_equal(seeds.state.means, fields[1].means[blocks[0].contains(fields[1].means)])
-    assert not seeds.state.frozen.any() and not any(depths.any() for depths in seeds.free_space)
-    # the scaffold's splats where neither block is, and the neighbor's own
-    elsewhere = ~blocks[0].contains(fields[0].means) & ~blocks[1].contains(fields[0].means)
-    around = np.concatenate(
-        [fields[0].means[elsewhere], fields[2].means[blocks[1].contains(fields[2].means)]]
-    )
-    shown = [[_in_margin(view, mean) for view in jobs[0].dataset.train] for mean in around]
-    np.testing.assert_array_equal(context.frozen.means, around[np.any(shown, axis=1)])
-    before, frozen = seeds.state.sh.copy(), context.frozen
-    run = SplatRun(jobs[0].dataset, jobs[0].config, seeds, context)
-    assert run.done == pytest.approx(REFINEMENT_START_PROGRESS)
-    assert len(run.state) == len(before) + len(frozen)
-    while run.done < 1.0:
-        run.advance()
-    assert run.step == jobs[0].config.steps and run.progress().seconds_left == 0.0
-    np.testing.assert_array_equal(run.state.means[run.state.frozen], frozen.means)
-    assert run.state.sh[~run.state.frozen].shape == before.shape
-    assert (run.state.sh[~run.state.frozen] != before).any()
-
-
-def _in_margin(view: View, mean: np.ndarray) -> bool:
-    """Whether a point lies in front of the camera, in the photo or a quarter of its size around it."""
-    (x, y), depth = (values[0] for values in view.camera.project(mean[None].astype(np.float64)))
-    width, height = view.camera.width, view.camera.height
-    return bool(depth > 0 and -0.25 * width <= x < 1.25 * width and -0.25 * height <= y < 1.25 * height)
 
 
 @pytest.mark.parametrize(
@@ -355,15 +283,16 @@ def test_finished_blocks_are_not_trained_again(
     whole = train_blocks(capture, blocks, jobs, evaluate=False)
     trained = [done for stage in training_stages(jobs) for job in stage if (done := read_block(job))]
     assert len(trained) == 5 and sum(len(done.field) for done in trained) > len(whole.field) > 0
-    refined = [done.field.means for done in trained[3:]]
-    np.testing.assert_array_equal(whole.field.means[: sum(map(len, refined))], np.concatenate(refined))
+    refined = [read_copies(job) for job in jobs]
+    means = [consensus(n, blocks[n].own(done.field), refined).means for n, done in enumerate(trained[1:3])]
+    np.testing.assert_array_equal(whole.field.means[: sum(map(len, means))], np.concatenate(means))
     assert whole.steps == sum(done.steps for done in trained)
     np.testing.assert_array_equal(whole.gains, trained[0].gains)
     for path in jobs[1].folder.glob("*-0002*"):
         path.unlink()
     began: list[str] = []
 
-    def counted(job: training.BlockJob, on_stage: object = None) -> bool:
+    def counted(job: BlockJob, on_stage: object = None) -> bool:
         began.append(job.name)
         return train_block(job)
 

@@ -2,7 +2,7 @@
 
     python -m benchmarks.captures.street STREET
     python -m benchmarks.captures.compare_blocks STREET -o FOLDER [--blocks 4] [--steps-per-photo 20]
-        [--processes 1]
+        [--processes 1] [--seed 0]
 
 Poses are verified as `cagefield train` does. Both get as many steps for each photo; the scaffold, each block
 and each refinement in a process of its own, so many at a time. FOLDER gets a Markdown row for each,
@@ -30,12 +30,11 @@ from cagefield.datasets.views import Dataset, View
 from cagefield.fields.splat_field import SplatField
 from cagefield.images.image_files import side_by_side, write_png
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
+from cagefield.training.splats.block_jobs import BlockJob, read_block
 from cagefield.training.splats.blocks import Block, divide, left_out, visible_points
 from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.training.splats.train_blocks import (
-    BlockJob,
     plan_blocks,
-    read_block,
     train_block,
     train_blocks,
     training_stages,
@@ -58,6 +57,7 @@ def main() -> None:
     parser.add_argument("--splats", type=int)
     parser.add_argument("--downscale", type=int)
     parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     rows = []
@@ -88,7 +88,9 @@ def plan(options: Any, count: int) -> tuple[Dataset, tuple[Block, ...], tuple[Bl
     """The capture with the blocks and the trainings of a comparison."""
     devices.start("cpu")
     dataset = load(options)
-    config = SplatConfig(steps=options.steps_per_photo * len(dataset.train), splats=options.splats)
+    config = SplatConfig(
+        steps=options.steps_per_photo * len(dataset.train), splats=options.splats, seed=options.seed
+    )
     return dataset, *plan_blocks(dataset, config, count, options.out / f"blocks-{count}")
 
 

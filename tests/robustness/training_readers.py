@@ -76,13 +76,34 @@ def _block(splats: int) -> Reader:
         (folder / "block-0001.json").write_text(json.dumps(record), encoding="utf-8")
 
     def read(folder: Path) -> None:
+        from cagefield.training.splats.block_jobs import BlockJob, read_block
         from cagefield.training.splats.splat_config import SplatConfig
-        from cagefield.training.splats.train_blocks import BlockJob, read_block
 
         dataset: Any = SimpleNamespace(train=(None,) * 40)
         read_block(BlockJob(0, dataset, SplatConfig(), folder, "known"))
 
     return Reader(make, read, {"block-0001.json": "json", "block-0001.safetensors": "safetensors"})
+
+
+def _copies(splats: int) -> Reader:
+    """A refinement's copies of splats: owner, row and steps of each."""
+
+    def make(folder: Path) -> None:
+        from cagefield.training.splats.refinement import Copies
+        from splat_scenes import ball_of_splats
+
+        field = ball_of_splats(splats)
+        rows = np.arange(len(field), dtype=np.int32)
+        Copies(field, rows % 3 - 1, rows, rows).save(folder / "refined-0001.copies")
+
+    def read(folder: Path) -> None:
+        from cagefield.training.splats.refinement import Copies, consensus
+        from splat_scenes import ball_of_splats
+
+        field = ball_of_splats(splats)
+        consensus(0, field, [Copies.load(folder / "refined-0001.copies", field)])
+
+    return Reader(make, read, {"refined-0001.copies": "safetensors"})
 
 
 def training_readers(resolution: int = 16, splats: int = 100, width: int = 8) -> dict[str, Reader]:
@@ -92,6 +113,7 @@ def training_readers(resolution: int = 16, splats: int = 100, width: int = 8) ->
         "training, splats": _training("splat", splats),
         "training, nerf": _training("nerf", width),
         "training, block": _block(splats),
+        "training, refinement": _copies(splats),
     }
 
 

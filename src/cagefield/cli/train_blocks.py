@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from cagefield.fields.splat_field import SplatField
     from cagefield.scene.scene import Scene
     from cagefield.training.result import TrainResult
+    from cagefield.training.splats.block_jobs import BlockJob
     from cagefield.training.splats.splat_config import SplatConfig
-    from cagefield.training.splats.train_blocks import BlockJob
 
 
 def train_in_blocks(

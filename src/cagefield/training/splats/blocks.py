@@ -10,9 +10,9 @@ background of an object is a small part of all photos that see it. Neighbors sha
 
 Content farther from all cameras than `FAR_DEPTHS` median depths, the sky for example, belongs to no block: it
 is the scaffold's (`scaffold`), which all photos train. Each block is trained by itself (`train_blocks`), with
-the scaffold's splats around it; then its own splats, whose means lie in its core and near cameras, are
-refined among those of its neighbors. The merged field has each block's own splats, and the scaffold's in no
-block.
+the scaffold's splats around it; of its splats those whose means lie in its core and near cameras are its own.
+They are refined together with those of its neighbors and the far ones (`refinement`). The merged field has
+each block's own splats, and the scaffold's in no block.
 
 Source: the division follows VastGaussian (Lin et al. 2024, section 4), with visibility from the points of
 the reconstruction.
@@ -80,6 +80,10 @@ class Block:
     def trains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
         """Mask [N] of positions [N,3] in the region and not far."""
         return self._near(inside_cell(self.region, positions), positions)
+
+    def is_far(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """Mask [N] of positions [N,3] that are far, in whichever core."""
+        return ~self._near(np.ones(len(positions), bool), positions)
 
     def _near(self, mask: NDArray[np.bool_], positions: NDArray[np.floating]) -> NDArray[np.bool_]:
         if self.cameras is not None:

@@ -2,7 +2,7 @@
 
 The scaffold is trained on all photos at a reduced size. It gives each block the photos' exposure gains and
 frozen splats for the content outside the block, and the merged field the content that is far from all
-cameras, which no block sees from enough places.
+cameras, which no block sees from enough places; the blocks' photos refine it (`refinement`).
 
 Source: the coarse scaffold of Hierarchical 3D Gaussians (Kerbl et al. 2024, section 5).
 """
@@ -53,12 +53,14 @@ class Context:
         gains: [V,3] exposure gains of the block's photos, which are kept.
         cell: space in which initial splats are placed; None keeps all of them.
         start_progress: progress at which the training begins, 0 to 1: above 0 of a refinement.
+        keeps_splats: no splat is split or removed, so that each keeps its row.
     """
 
     frozen: SplatField
     gains: Float32
     cell: Cell | None = None
     start_progress: float = 0.0
+    keeps_splats: bool = False
 
     def joined(self, state: SplatState) -> SplatState:
         """The initial splats of `state` within the cell, and the frozen ones.
@@ -76,6 +78,11 @@ class Context:
 
 def visible_splats(field: SplatField, cameras: Sequence[Camera]) -> SplatField:
     """Splats whose means lie in front of a camera, in its photo or in a margin around it."""
+    return field.take(visible_mask(field, cameras))
+
+
+def visible_mask(field: SplatField, cameras: Sequence[Camera]) -> NDArray[np.bool_]:
+    """Mask [N] of the splats that `visible_splats` takes."""
     means = field.means.astype(np.float64)
     shown = np.zeros(len(field), bool)
     for camera in cameras:
@@ -84,7 +91,7 @@ def visible_splats(field: SplatField, cameras: Sequence[Camera]) -> SplatField:
         with np.errstate(invalid="ignore"):
             inside = (pixels >= -VIEW_MARGIN * size).all(axis=1)
             shown |= inside & (pixels < (1.0 + VIEW_MARGIN) * size).all(axis=1) & (depth > 0)
-    return field.take(shown)
+    return shown
 
 
 def scaffold_config(config: SplatConfig) -> SplatConfig:

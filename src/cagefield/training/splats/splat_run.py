@@ -44,6 +44,7 @@ from cagefield.training.splats.robust_weights import ROBUST_START_PROGRESS, Robu
 from cagefield.training.splats.scaffold import Context
 from cagefield.training.splats.splat_config import CHECKPOINT_KEYS, SplatConfig
 from cagefield.training.splats.splat_optimizer import Photo, SplatOptimizer
+from cagefield.training.splats.splat_progress import SplatProgress
 from cagefield.training.splats.splat_state import SplatState
 from cagefield.training.splats.training_views import load_views
 
@@ -120,6 +121,7 @@ class SplatRun:
         self._max_splats = max_splats([view.cameras[0] for view in self.views], config)
         state, self.free_distances = seeds or initialize_splats(dataset, self.views, config, self._max_splats)
         self._start_progress = 0.0 if context is None else context.start_progress
+        self._keeps_splats = context is not None and context.keeps_splats
         if context is not None:
             state = context.joined(state)
         self._optimizer = new_optimizer(state, self._near, config.antialiased)
@@ -167,13 +169,8 @@ class SplatRun:
         """Train one photo, after a due densification or removal of obstructions."""
         began = time.perf_counter()
         done = self.done
-        if (
-            self.step % DENSIFICATION_INTERVAL_STEPS == DENSIFICATION_INTERVAL_STEPS - 1
-            and DENSIFICATION_PROGRESS[0] <= done < DENSIFICATION_PROGRESS[1]
-        ):
-            self._densify(done)
-        if self.step % CARVING_INTERVAL_STEPS == CARVING_INTERVAL_STEPS - 1 and done < 0.95:
-            self._remove_obstructions()
+        if not self._keeps_splats:
+            self._change_splats(done)
         if not self._queue:
             self.poses.remove_mean_motion()
             if self._robust is not None:
@@ -183,6 +180,16 @@ class SplatRun:
         self.step += 1
         self.seconds += 0.0 if self._is_first_step else time.perf_counter() - began
         self._is_first_step = False
+
+    def _change_splats(self, done: float) -> None:
+        """Densify and remove obstructions where they are due."""
+        if (
+            self.step % DENSIFICATION_INTERVAL_STEPS == DENSIFICATION_INTERVAL_STEPS - 1
+            and DENSIFICATION_PROGRESS[0] <= done < DENSIFICATION_PROGRESS[1]
+        ):
+            self._densify(done)
+        if self.step % CARVING_INTERVAL_STEPS == CARVING_INTERVAL_STEPS - 1 and done < 0.95:
+            self._remove_obstructions()
 
     def step_photo(self, index: int, done: float) -> None:
         """Take one step of all splats visible in a photo."""
@@ -378,21 +385,3 @@ class SplatRun:
         sizes = [[view.cameras[0].width, view.cameras[0].height] for view in self.views]
         settings = signature_options(self._config, CHECKPOINT_KEYS)
         return json.dumps(["splats", settings, [view.name for view in self.views], sizes])
-
-
-@dataclasses.dataclass(frozen=True)
-class SplatProgress:
-    """Progress of a run: `done` in [0,1], running mean squared error and its PSNR, seconds, splats."""
-
-    done: float
-    step: int
-    loss: float
-    psnr: float
-    seconds: float
-    seconds_left: float
-    splats: int
-
-    def __str__(self) -> str:
-        """Loss, PSNR, speed and number of splats."""
-        rate = self.step / max(self.seconds, 1e-9)
-        return f"loss {self.loss:.5f}, PSNR {self.psnr:.1f} dB, {rate:.0f} photos/s, {self.splats} splats"

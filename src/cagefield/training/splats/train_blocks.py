@@ -1,17 +1,13 @@
 """Training of a capture in blocks, one after another or on a cluster, into one SplatField.
 
 First the scaffold is trained (`scaffold`), on all photos at a reduced size, then each block with the
-scaffold's splats around it. At last each block's splats are refined: they take the last part of the block's
-steps among the finished splats of its neighbors, the blocks that share photos with it, instead of the
-scaffold's coarse ones. A folder keeps the finished ones, `block-0001.safetensors` with `block-0001.json`,
-`refined-0001.safetensors` and so on, and the checkpoint of the block in training, so that a training goes on
-where it stopped. One block is in memory at a time, a refinement with the splats of its neighbors, whose
-number does not grow with the capture. Each block gets as many steps and splats for each of its photos as a
-training of the whole capture would.
-
-Source: a refinement of the blocks is a step of block coordinate descent (Jacobi) on the loss of the whole
-capture; all blocks take it at once, from the same surroundings, so that it runs on many machines and does not
-depend on the blocks' order.
+scaffold's splats around it. At last the blocks are refined (`refinement`): each takes the last part of its
+steps with copies of all splats that its photos show, its own, those of its neighbors, and the far ones; the
+merged field has the means of the copies. Blocks are neighbors where they share photos. A folder keeps the
+finished ones, `block-0001.safetensors` with `block-0001.json`, `refined-0001.safetensors` and so on, and the
+checkpoint of the block in training, so that a training goes on where it stopped. One block is in memory at a
+time, a refinement with the splats of its neighbors, whose number does not grow with the capture. Each block
+gets as many steps and splats for each of its photos as a training of the whole capture would.
 """
 
 from __future__ import annotations
@@ -19,11 +15,10 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -31,114 +26,30 @@ from cagefield.datasets.sfm.sparse_points import points_cache_folder, starting_p
 from cagefield.datasets.views import Dataset, SparsePoints
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
-from cagefield.files import json_text
-from cagefield.files.atomic import replaced_file
-from cagefield.files.safe_open import UnreadableError, open_regular
 from cagefield.training.evaluation import evaluate_views
 from cagefield.training.result import TrainResult
+from cagefield.training.splats.block_jobs import (
+    BlockJob,
+    TrainedBlock,
+    read_block,
+    read_copies,
+    read_finished,
+    write_block,
+)
 from cagefield.training.splats.blocks import Block, block_dataset, concatenate, divide, merge
-from cagefield.training.splats.initialization import InitialSplats
+from cagefield.training.splats.refinement import FAR_OWNER, consensus, train_copies
 from cagefield.training.splats.scaffold import (
     MIN_SPLATS,
-    Context,
     scaffold_config,
     scaffold_dataset,
-    visible_splats,
 )
 from cagefield.training.splats.splat_config import SplatConfig
-from cagefield.training.splats.splat_state import SplatState
 from cagefield.training.splats.train_splats import train_splat
 
 REFINEMENT_STEPS_SHARE = 0.25
 """Steps of a block's refinement, as a share of the block's."""
-REFINEMENT_START_PROGRESS = 0.6
-"""Progress of a training, in its learning rate and resolution, at which a refinement begins."""
 
 OnStage = Callable[[str, float, str], None]
-_MAX_RECORD_BYTES = 1 << 22
-
-
-@dataclass(frozen=True)
-class BlockJob:
-    """One block's training: photos and points, options with its own steps, and the files it writes.
-
-    `key` is a digest of everything that the result depends on. The training of the scaffold has number -1
-    and no `block`; without a `scaffold` the block is the whole capture. A refinement has the `first` training
-    of its block, and those of its neighbors, of which only the files are read.
-    """
-
-    number: int
-    dataset: Dataset
-    config: SplatConfig
-    folder: Path
-    key: str
-    block: Block | None = None
-    scaffold: BlockJob | None = None
-    first: BlockJob | None = None
-    neighbors: tuple[BlockJob, ...] = ()
-
-    @property
-    def name(self) -> str:
-        """Name of the training in messages; blocks count from 1."""
-        name = "scaffold" if self.number < 0 else f"block {self.number + 1}"
-        return name if self.first is None else f"{name}, refinement"
-
-    @property
-    def photo_count(self) -> int:
-        """Number of the training's photos."""
-        return len(self.dataset.train if self.block is None else self.block.photos)
-
-    def path(self, suffix: str) -> Path:
-        """A file of the block in the folder."""
-        kind = "block" if self.first is None else "refined"
-        stem = "scaffold" if self.number < 0 else f"{kind}-{self.number + 1:04d}"
-        return self.folder / f"{stem}{suffix}"
-
-    def context(self) -> Context | None:
-        """Surroundings from the finished scaffold, for a refinement also from the neighbors; None without.
-
-        Raises:
-            CagefieldError: one of them is not finished, damaged, or of another training.
-        """
-        if self.scaffold is None or self.block is None:
-            return None
-        coarse = read_finished(self.scaffold)
-        gains = coarse.gains[list(self.block.photos)]
-        cameras = [view.camera for view in self.dataset.train]
-        if self.first is None:
-            outside = coarse.field.take(~self.block.trains(coarse.field.means))
-            return Context(visible_splats(outside, cameras), gains, self.block)
-        others = [(job.block, read_finished(job).field) for job in self.neighbors if job.block is not None]
-        elsewhere = ~self.block.contains(coarse.field.means)
-        for block, _ in others:
-            elsewhere &= ~block.contains(coarse.field.means)
-        parts = [coarse.field.take(elsewhere), *(block.own(field) for block, field in others)]
-        frozen = concatenate([visible_splats(part, cameras) for part in parts])
-        return Context(frozen, gains, start_progress=REFINEMENT_START_PROGRESS)
-
-    def seeds(self) -> InitialSplats | None:
-        """Splats of a refinement, the block's own after its first training; None of another training.
-
-        Nothing is known of the photos' free space.
-        """
-        if self.first is None or self.block is None:
-            return None
-        own = self.block.own(read_finished(self.first).field)
-        cameras = [view.camera for view in self.dataset.train]
-        return InitialSplats(
-            SplatState.from_field(own, (self.config.sh_degree + 1) ** 2),
-            [np.zeros((2, camera.height, camera.width), np.float32) for camera in cameras],
-        )
-
-
-@dataclass(frozen=True)
-class TrainedBlock:
-    """A finished block's field with its photos' gains, steps and seconds."""
-
-    field: SplatField
-    gains: np.ndarray[Any, np.dtype[np.float32]]
-    steps: int
-    seconds: float
 
 
 Trainer = Callable[[Sequence[BlockJob]], Iterable[BlockJob]]
@@ -208,7 +119,7 @@ def _refinements(jobs: Sequence[BlockJob], configs: Sequence[SplatConfig]) -> tu
     found = []
     for job, config in zip(jobs, configs, strict=True):
         near = tuple(light[n] for n in range(len(jobs)) if n != job.number and photos[n] & photos[job.number])
-        content = json.dumps([job.key, [other.key for other in near], dataclasses.asdict(config)])
+        content = json.dumps(["copies", job.key, [other.key for other in near], dataclasses.asdict(config)])
         key = hashlib.sha256(content.encode()).hexdigest()
         found.append(replace(job, config=config, key=key, first=light[job.number], neighbors=near))
     return tuple(found)
@@ -270,10 +181,8 @@ def train_blocks(
         only = first[0]
         field, gains = only.field, only.gains
     else:
-        there = sorted(first)
-        fields = [refined[n].field if n in refined else blocks[n].own(first[n].field) for n in there]
-        field = merge([blocks[n] for n in there], fields, coarse.field)
-        gains = coarse.gains
+        ended = [job for job in jobs if job.number in refined]
+        field, gains = _merged(blocks, first, coarse.field, ended), coarse.gains
         results.append(coarse)
     some = dataset.train[:: max(1, len(dataset.train) // 10)] if evaluate else ()
     return TrainResult(
@@ -288,15 +197,39 @@ def train_blocks(
     )
 
 
+def _merged(
+    blocks: Sequence[Block],
+    first: Mapping[int, TrainedBlock],
+    coarse: SplatField,
+    refined: Sequence[BlockJob],
+) -> SplatField:
+    """The field of the blocks, with the means of the copies of the finished refinements."""
+    there, far = sorted(first), blocks[0].is_far(coarse.means)
+    fields = []
+    for number in there:
+        sharing = [job for job in refined if number in {job.number, *(near.number for near in job.neighbors)}]
+        fields.append(consensus(number, blocks[number].own(first[number].field), map(read_copies, sharing)))
+    backdrop = consensus(FAR_OWNER, coarse.take(far), map(read_copies, refined))
+    near = merge([blocks[n] for n in there], fields, coarse.take(~far))
+    return concatenate([near, backdrop])
+
+
 def _finished(
     jobs: Sequence[BlockJob], run: Callable[[Sequence[BlockJob]], Iterable[BlockJob]]
 ) -> dict[int, TrainedBlock]:
-    """Finished blocks by number, after `run` has trained those that are not there."""
-    found = {job.number: done for job in jobs if (done := read_block(job)) is not None}
+    """Finished blocks by number, after `run` has trained those that are not there.
+
+    Refinements have no splats here, of which there are several copies; `_merged` reads them.
+    """
+    found = {job.number: _lightened(job, done) for job in jobs if (done := read_block(job)) is not None}
     missing = [job for job in jobs if job.number not in found]
     for job in run(missing) if missing else ():
-        found[job.number] = read_finished(job)
+        found[job.number] = _lightened(job, read_finished(job))
     return found
+
+
+def _lightened(job: BlockJob, done: TrainedBlock) -> TrainedBlock:
+    return done if job.first is None else replace(done, field=done.field.take(np.arange(0)))
 
 
 def train_block(job: BlockJob, on_stage: OnStage | None = None) -> bool:
@@ -305,73 +238,37 @@ def train_block(job: BlockJob, on_stage: OnStage | None = None) -> bool:
     checkpoint = job.path(".training")
     move = on_stage or (lambda stage, done, note: None)
     stage = f"Training {job.name}"
-    result = train_splat(
-        job.dataset,
-        job.config,
-        seeds=job.seeds(),
-        context=job.context(),
-        checkpoint=checkpoint,
-        resume=checkpoint.is_file(),
-        on_progress=lambda progress: move(stage, getattr(progress, "done", 0.0), str(progress)),
-        on_stage=move,
-        evaluate=False,
-    )
-    if not result.finished:
-        return False
-    gains = np.ones((len(job.dataset.train), 3), np.float32) if result.gains is None else result.gains
-    result.field.save(job.path(".safetensors"))
-    record = {"key": job.key, "steps": result.steps, "seconds": result.seconds, "gains": gains.tolist()}
-    with replaced_file(job.path(".json")) as draft:
-        draft.write_text(json.dumps(record), encoding="utf-8")
+
+    def report(progress: object) -> None:
+        move(stage, getattr(progress, "done", 0.0), str(progress))
+
+    context, copies, resume = job.context(), job.copies(), checkpoint.is_file()
+    if context is not None and copies is not None:
+        move(stage, 0.0, "")
+        trained = train_copies(
+            copies, job.dataset, job.config, context, checkpoint=checkpoint, resume=resume, on_progress=report
+        )
+        if trained is None:
+            return False
+        copies, steps, seconds = trained
+        write_block(job, copies.field, context.gains, steps, seconds, copies)
+    else:
+        result = train_splat(
+            job.dataset,
+            job.config,
+            context=context,
+            checkpoint=checkpoint,
+            resume=resume,
+            on_progress=report,
+            on_stage=move,
+            evaluate=False,
+        )
+        if not result.finished:
+            return False
+        gains = np.ones((len(job.dataset.train), 3), np.float32) if result.gains is None else result.gains
+        write_block(job, result.field, gains, result.steps, result.seconds)
     checkpoint.unlink(missing_ok=True)
     return True
-
-
-def read_block(job: BlockJob) -> TrainedBlock | None:
-    """A finished block from its files, None where it is not finished.
-
-    Raises:
-        CagefieldError: damaged files, and those of another training.
-    """
-    path = job.path(".json")
-    if not path.exists():
-        return None
-    try:
-        with open_regular(path) as file:
-            record = json_text.loads(file.read(_MAX_RECORD_BYTES).decode("utf-8"))
-        key, steps, seconds = str(record["key"]), int(record["steps"]), float(record["seconds"])
-        gains = np.array(record["gains"], np.float32)
-    except (
-        OSError,
-        UnreadableError,
-        ValueError,
-        TypeError,
-        LookupError,
-        AttributeError,
-        OverflowError,
-    ) as error:
-        raise CagefieldError(
-            f"{path} is damaged ({error!s:.80}); remove it to train {job.name} again"
-        ) from None
-    if key != job.key:
-        raise CagefieldError(
-            f"{path} is of other photos or options; give those of the first run, or --overwrite"
-        )
-    if gains.shape != (job.photo_count, 3) or not np.isfinite(gains).all() or not (gains > 0).all():
-        raise CagefieldError(f"{path} is damaged (its gains); remove it to train {job.name} again")
-    return TrainedBlock(SplatField.load(job.path(".safetensors")), gains, steps, seconds)
-
-
-def read_finished(job: BlockJob) -> TrainedBlock:
-    """A finished block from its files.
-
-    Raises:
-        CagefieldError: it is not finished; damaged files, and those of another training.
-    """
-    done = read_block(job)
-    if done is None:
-        raise CagefieldError(f"{job.path('.safetensors')} is not there; the folder must be shared")
-    return done
 
 
 def _one_by_one(jobs: Sequence[BlockJob], on_stage: OnStage | None) -> Iterator[BlockJob]:
