@@ -168,6 +168,12 @@ def add_worker(opened: ExitStack, address: str) -> None:
     opened.enter_context(process("dask_worker", address, "--no-nanny", "--nthreads", "1"))
 
 
+def wait_for_workers(address: str, count: int) -> None:
+    """Returns once so many have joined, which takes a busy machine longer than the patience of a test."""
+    with connect(address) as client:
+        client.wait_for_workers(count, timeout=600)
+
+
 @pytest.mark.nightly
 @needs_dask
 def test_a_scheduler_without_workers_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -189,13 +195,13 @@ def test_workers_that_all_vanish_are_waited_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, late: bool
 ) -> None:
     """Two workers, each ended by SIGKILL; a third one that comes late takes the tasks."""
-    monkeypatch.setattr(patience, "NOTICE_SECONDS", 1.0)
-    monkeypatch.setattr(patience, "WORKER_SECONDS", 600.0 if late else 3.0)
     marks = tmp_path / "marks"
     marks.mkdir()
     tasks = {"killer": Task(killed_twice, (marks,))}
     with farm(tmp_path, 2) as (address, _, opened), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
+        wait_for_workers(address, 2)
+        monkeypatch.setattr(patience, "NOTICE_SECONDS", 1.0)
         if late:
             warn = patience.Patience._notice
 
@@ -204,10 +210,9 @@ def test_workers_that_all_vanish_are_waited_for(
                 return warn(watch)
 
             monkeypatch.setattr(patience.Patience, "_notice", noticed)
-            with connect(address) as client:
-                client.wait_for_workers(2, timeout=600)
             assert dict(run_tasks(address, tasks, device="cpu")) == {"killer": b"\0\1"}
         else:
+            monkeypatch.setattr(patience, "WORKER_SECONDS", 3.0)
             with pytest.raises(LostClusterError, match=f"{address} has had no workers for 3 s; start some"):
                 dict(run_tasks(address, tasks, device="cpu"))
     messages = [str(one.message) for one in caught]
@@ -230,11 +235,12 @@ def test_a_scheduler_that_dies_or_falls_silent_in_the_middle(
     message: str,
 ) -> None:
     """One line and none of dask's own, though the scheduler cannot be told that the client leaves."""
-    monkeypatch.setattr(patience, "NOTICE_SECONDS", 1.0)
-    monkeypatch.setattr(patience, "WORKER_SECONDS", 3.0)
     tasks = {"first": Task(cubed, (2,)), "second": Task(slept, (600.0,))}
     with farm(tmp_path, 1) as (address, scheduler, _), warnings.catch_warnings():
         warnings.simplefilter("ignore")
+        wait_for_workers(address, 1)
+        monkeypatch.setattr(patience, "NOTICE_SECONDS", 1.0)
+        monkeypatch.setattr(patience, "WORKER_SECONDS", 3.0)
         results = run_tasks(address, tasks, device="cpu")
         assert next(results) == ("first", 8)
         scheduler.send_signal(number)

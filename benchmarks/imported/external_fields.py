@@ -90,7 +90,7 @@ def row(path: Path, data: Path | None) -> str:
         maker = "authors' code" + (", values not trained" if "untrained" in theirs else ", trained")
         agreement = f"{against_authors(theirs['rgb'][0], scene, cameras[0]):.1f} dB"
     columns = [
-        found.description,
+        f"`{path.name}`: {found.description}",
         f"{path.stat().st_size / 1e3:.0f} kB",
         maker,
         agreement,
