@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import importlib.util
-import json
-import os
 import re
 import signal
-import subprocess
-import sys
 import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -26,6 +21,7 @@ from cagefield.cluster.connection import connect
 from cagefield.cluster.patience import LostClusterError, Patience
 from cagefield.cluster.tasks import Task, run_tasks
 from cluster_functions import cubed, killed_twice, slept
+from dask_processes import add_worker, farm, wait_for_workers
 
 needs_dask = pytest.mark.skipif(
     importlib.util.find_spec("distributed") is None,
@@ -129,49 +125,6 @@ def test_a_closed_connection_ends_at_once(client_of: Callable[..., Any]) -> None
     client.status = "connecting"
     with pytest.raises(LostClusterError, match="connection to the cluster is lost; go on with --keep"):
         watch.check()
-
-
-@contextmanager
-def process(*words: str) -> Iterator[subprocess.Popen[bytes]]:
-    """A process of dask that finds the tests' modules, ended with the context."""
-    paths = os.pathsep.join(path for path in sys.path if path)
-    started = subprocess.Popen(
-        [sys.executable, "-m", "distributed.cli." + words[0], *words[1:], "--no-dashboard"],
-        env={**os.environ, "PYTHONPATH": paths},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        yield started
-    finally:
-        started.kill()
-        started.wait()
-
-
-@contextmanager
-def farm(folder: Path, workers: int) -> Iterator[tuple[str, subprocess.Popen[bytes], ExitStack]]:
-    """Address and process of a scheduler with workers that nobody starts again."""
-    file = folder / "scheduler.json"
-    with ExitStack() as opened:
-        words = ("dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))
-        scheduler = opened.enter_context(process(*words))
-        while not file.exists() or not file.read_text().endswith("}"):
-            assert scheduler.poll() is None
-            time.sleep(0.05)
-        address = json.loads(file.read_text())["address"]
-        for _ in range(workers):
-            add_worker(opened, address)
-        yield address, scheduler, opened
-
-
-def add_worker(opened: ExitStack, address: str) -> None:
-    opened.enter_context(process("dask_worker", address, "--no-nanny", "--nthreads", "1"))
-
-
-def wait_for_workers(address: str, count: int) -> None:
-    """Returns once so many have joined, which takes a busy machine longer than the patience of a test."""
-    with connect(address) as client:
-        client.wait_for_workers(count, timeout=600)
 
 
 @pytest.mark.nightly
