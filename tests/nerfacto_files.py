@@ -129,12 +129,15 @@ def flat(matrices: list[np.ndarray[Any, Any]], garbage: float) -> np.ndarray[Any
 def write_checkpoint(
     path: Path, values: dict[str, Any], layout: str = "torch", garbage: float = 0.25
 ) -> Path:
-    """step-*.ckpt of `arrays`; without biases where the layout is tiny-cuda-nn's."""
+    """step-*.ckpt of `arrays`; without biases where the layout is tiny-cuda-nn's.
+
+    `values` may have its own "box" [2,3], and no embedding ("appearance": None).
+    """
     field, nets = "_model.field", "_model.proposal_networks"
-    state: dict[str, Any] = {
-        f"{field}.aabb": np.array([[-1.5] * 3, [1.5] * 3], np.float32),
-        f"{field}.embedding_appearance.embedding.weight": values["appearance"],
-    }
+    box = values.get("box", np.array([[-1.5] * 3, [1.5] * 3], np.float32))
+    state: dict[str, Any] = {f"{field}.aabb": box}
+    if values["appearance"] is not None:
+        state[f"{field}.embedding_appearance.embedding.weight"] = values["appearance"]
 
     def layers(prefix: str, pair: Any) -> None:
         for index, (weight, bias) in enumerate(zip(*pair, strict=True)):

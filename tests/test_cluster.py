@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib.util
 import pickle
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -21,7 +22,7 @@ from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframe_files import dump_path
 from cagefield.cameras.keyframes import Keyframe
 from cagefield.cli import main
-from cagefield.cli.frame_files import FrameFiles, parse_frames
+from cagefield.cli.frame_files import FrameFiles, frames_folder, parse_frames
 from cagefield.cluster import connection
 from cagefield.cluster.connection import TlsFiles, connect, parse_cluster
 from cagefield.cluster.frame_tasks import FrameJob, render_frame, write_contents
@@ -218,6 +219,33 @@ def test_a_video_from_kept_frames_is_the_video(scene: Path, tmp_path: Path) -> N
     run("render", scene, "-o", tmp_path / "kept.mp4", *options, "--keep")
     assert (tmp_path / "kept.mp4").read_bytes() == (tmp_path / "one.mp4").read_bytes()
     assert len(list((tmp_path / "kept_frames").iterdir())) == 16
+
+
+@pytest.mark.parametrize("error", [CagefieldError("connection lost"), KeyboardInterrupt()])
+def test_frames_of_a_video_that_fails_are_kept(tmp_path: Path, error: BaseException) -> None:
+    """They become NAME_frames, which an earlier end may have left."""
+    video, kept = tmp_path / "a.mp4", tmp_path / "a_frames"
+    for content, message in ((b"first", "1 picture stays in .*a_frames; go on with --keep"), (b"second", "")):
+        with (
+            pytest.warns(UserWarning, match=message) if message else nullcontext(),
+            pytest.raises(type(error)),
+            frames_folder(video, keep=False) as folder,
+        ):
+            folder.mkdir()
+            (folder / "0003.png").write_bytes(content)
+            (folder / "0003_depth.png").write_bytes(content)
+            raise error
+        assert [path.name for path in tmp_path.iterdir()] == ["a_frames"]
+        assert files_of(kept) == {"0003.png": b"first", "0003_depth.png": b"first"}
+
+
+def test_an_end_before_the_first_frame_leaves_nothing(tmp_path: Path) -> None:
+    for made in (False, True):
+        with pytest.raises(CagefieldError), frames_folder(tmp_path / "a.mp4", keep=False) as folder:
+            if made:
+                folder.mkdir()
+            raise CagefieldError("no workers")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_worker_without_the_folders_returns_the_files(scene: Path, tmp_path: Path) -> None:

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import importlib.util
-import json
-import os
 import re
 import signal
-import subprocess
-import sys
 import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -26,6 +21,7 @@ from cagefield.cluster.connection import connect
 from cagefield.cluster.patience import LostClusterError, Patience
 from cagefield.cluster.tasks import Task, run_tasks
 from cluster_functions import cubed, killed_twice, slept
+from dask_processes import add_worker, farm, wait_for_workers
 
 needs_dask = pytest.mark.skipif(
     importlib.util.find_spec("distributed") is None,
@@ -131,43 +127,6 @@ def test_a_closed_connection_ends_at_once(client_of: Callable[..., Any]) -> None
         watch.check()
 
 
-@contextmanager
-def process(*words: str) -> Iterator[subprocess.Popen[bytes]]:
-    """A process of dask that finds the tests' modules, ended with the context."""
-    paths = os.pathsep.join(path for path in sys.path if path)
-    started = subprocess.Popen(
-        [sys.executable, "-m", "distributed.cli." + words[0], *words[1:], "--no-dashboard"],
-        env={**os.environ, "PYTHONPATH": paths},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        yield started
-    finally:
-        started.kill()
-        started.wait()
-
-
-@contextmanager
-def farm(folder: Path, workers: int) -> Iterator[tuple[str, subprocess.Popen[bytes], ExitStack]]:
-    """Address and process of a scheduler with workers that nobody starts again."""
-    file = folder / "scheduler.json"
-    with ExitStack() as opened:
-        words = ("dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))
-        scheduler = opened.enter_context(process(*words))
-        while not file.exists() or not file.read_text().endswith("}"):
-            assert scheduler.poll() is None
-            time.sleep(0.05)
-        address = json.loads(file.read_text())["address"]
-        for _ in range(workers):
-            add_worker(opened, address)
-        yield address, scheduler, opened
-
-
-def add_worker(opened: ExitStack, address: str) -> None:
-    opened.enter_context(process("dask_worker", address, "--no-nanny", "--nthreads", "1"))
-
-
 @pytest.mark.nightly
 @needs_dask
 def test_a_scheduler_without_workers_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -189,13 +148,13 @@ def test_workers_that_all_vanish_are_waited_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, late: bool
 ) -> None:
     """Two workers, each ended by SIGKILL; a third one that comes late takes the tasks."""
-    monkeypatch.setattr(patience, "NOTICE_SECONDS", 1.0)
-    monkeypatch.setattr(patience, "WORKER_SECONDS", 600.0 if late else 3.0)
     marks = tmp_path / "marks"
     marks.mkdir()
     tasks = {"killer": Task(killed_twice, (marks,))}
     with farm(tmp_path, 2) as (address, _, opened), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
+        wait_for_workers(address, 2)
+        monkeypatch.setattr(patience, "NOTICE_SECONDS", 1.0)
         if late:
             warn = patience.Patience._notice
 
@@ -204,10 +163,9 @@ def test_workers_that_all_vanish_are_waited_for(
                 return warn(watch)
 
             monkeypatch.setattr(patience.Patience, "_notice", noticed)
-            with connect(address) as client:
-                client.wait_for_workers(2, timeout=600)
             assert dict(run_tasks(address, tasks, device="cpu")) == {"killer": b"\0\1"}
         else:
+            monkeypatch.setattr(patience, "WORKER_SECONDS", 3.0)
             with pytest.raises(LostClusterError, match=f"{address} has had no workers for 3 s; start some"):
                 dict(run_tasks(address, tasks, device="cpu"))
     messages = [str(one.message) for one in caught]
@@ -230,11 +188,12 @@ def test_a_scheduler_that_dies_or_falls_silent_in_the_middle(
     message: str,
 ) -> None:
     """One line and none of dask's own, though the scheduler cannot be told that the client leaves."""
-    monkeypatch.setattr(patience, "NOTICE_SECONDS", 1.0)
-    monkeypatch.setattr(patience, "WORKER_SECONDS", 3.0)
     tasks = {"first": Task(cubed, (2,)), "second": Task(slept, (600.0,))}
     with farm(tmp_path, 1) as (address, scheduler, _), warnings.catch_warnings():
         warnings.simplefilter("ignore")
+        wait_for_workers(address, 1)
+        monkeypatch.setattr(patience, "NOTICE_SECONDS", 1.0)
+        monkeypatch.setattr(patience, "WORKER_SECONDS", 3.0)
         results = run_tasks(address, tasks, device="cpu")
         assert next(results) == ("first", 8)
         scheduler.send_signal(number)

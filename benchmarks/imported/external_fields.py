@@ -63,7 +63,8 @@ def main() -> None:
     if options.out is not None:
         heading = (
             f"# Fields of other programs\n\n{cpu_model()}; processor time of one picture of {SIZE} x {SIZE} "
-            f"pixels; voxels baked with {BAKED} on the longest axis.\n\n"
+            f"pixels; voxels baked with {BAKED} on the longest axis. Rows ran one after "
+            "another, beside other processes (nice 19), so no times by the clock.\n\n"
             "`python -m benchmarks.imported.external_fields FILES... --data DATA -o "
             "benchmarks/results/external_fields.md`; the files by `train_tensorf`, `train_nerfacto` and "
             "`written_fields`.\n\n"
@@ -84,12 +85,12 @@ def row(path: Path, data: Path | None) -> str:
         cameras = (Camera(theirs["c2w"][0], int(width), int(height), fx, fy, cx, cy),)
     scene = scene_of(found, cameras)
     if theirs is None:
-        maker, agreement = "our own writer of the layout", "none"
+        maker, agreement = "an independent writer, no genuine file seen", "none"
     else:
         maker = "authors' code" + (", values not trained" if "untrained" in theirs else ", trained")
         agreement = f"{against_authors(theirs['rgb'][0], scene, cameras[0]):.1f} dB"
     columns = [
-        found.description,
+        f"`{path.name}`: {found.description}",
         f"{path.stat().st_size / 1e3:.0f} kB",
         maker,
         agreement,

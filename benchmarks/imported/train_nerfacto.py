@@ -148,6 +148,7 @@ def _renders(pipeline: Any) -> dict[str, Any]:
     pipeline.eval()
     pipeline.model.proposal_sampler.set_anneal(1.0)
     cameras, found = pipeline.datamanager.eval_dataset.cameras, {}
+    cameras.distortion_params = None  # pinholes, as `Camera`
     for index in range(min(VIEWS, len(cameras))):
         with torch.no_grad():
             outputs = pipeline.model.get_outputs_for_camera(cameras[index : index + 1])

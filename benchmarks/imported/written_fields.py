@@ -2,9 +2,10 @@
 
     python -m benchmarks.imported.written_fields -o FOLDER [--svox2 SOURCES]
 
-instant_ngp.ingp, plenoctree.npz (svox), svraster.pt and svox2.npz (Plenoxels). With SOURCES, a clone of
-github.com/sxyu/svox2, the authors' `SparseGrid.save` writes the last one, and svox2_pictures.npz has a view
-by their renderer: rgb [1,H,W,3], c2w [1,4,4] and lens [1,6] (fx, fy, cx, cy, width, height).
+instant_ngp.ingp, nerfacto_tcnn/ (nerfacto in tiny-cuda-nn's layout), plenoctree.npz (svox), svraster.pt and
+svox2.npz (Plenoxels). With SOURCES, a clone of github.com/sxyu/svox2 (`pip install tqdm`), the authors'
+`SparseGrid.save` writes the last one, and svox2_pictures.npz has a view by their renderer: rgb [1,H,W,3],
+c2w [1,4,4] and lens [1,6] (fx, fy, cx, cy, width, height).
 
 Values are those of the chair's solid field, blurred to the grid (`WIDTH`), seen from above: no trained
 field, but one whose edits show.
@@ -13,6 +14,7 @@ field, but one whose edits show.
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,7 @@ from cagefield.typing import Array
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
+from nerfacto_files import flat, write_checkpoint
 from ngp_files import snapshot, write
 from svraster_files import svraster_content, write_svraster
 
@@ -45,11 +48,13 @@ def main() -> None:
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     write_instant_ngp(options.out / "instant_ngp.ingp")
+    write_nerfacto(options.out / "nerfacto_tcnn")
     write_plenoctree(options.out / "plenoctree.npz")
     write_voxels(options.out / "svraster.pt")
     write_svox2(options.out / "svox2.npz", options.svox2)
-    for path in sorted(options.out.iterdir()):
-        print(f"{path}: {path.stat().st_size} bytes")
+    for path in sorted(options.out.rglob("*")):
+        if path.is_file():
+            print(f"{path}: {path.stat().st_size} bytes")
 
 
 def solid(points: Array) -> tuple[Array, Array]:
@@ -69,34 +74,44 @@ def cell_centers(cells: int = CELLS) -> Array:
     return np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1) + CENTER
 
 
-def write_instant_ngp(path: Path) -> None:
-    """A snapshot with one dense level, and perceptrons that pass its four features on: relu(h) - relu(-h)."""
-    base = CELLS
-    resolution = base  # scale base - 1, vertices at (i - 1/2) / (base - 1)
-    scale, offset = 0.5 / HALF, np.full(3, 0.5)
-    axis = (np.arange(resolution) - 0.5) / (base - 1)
-    x = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
-    sigma, rgb = solid(((x - offset) / scale)[..., [2, 0, 1]])
+def vertices() -> Array:
+    """Vertices [n,n,n,3] of a dense level of CELLS in tiny-cuda-nn's grid, in the grid's unit cube."""
+    axis = (np.arange(CELLS) - 0.5) / (CELLS - 1)
+    return np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+
+
+def dense_level(points: Array, unit: float) -> Array:
+    """Table [n^3,4] of a dense level whose vertices are at `points` [n,n,n,3] of the world.
+
+    Features: logarithm of the density per field's unit, `unit` world units, and logits of the color.
+    """
+    sigma, rgb = solid(points)
     features = np.empty((*sigma.shape, 4))
-    features[..., 0] = np.log(np.maximum(sigma, 1e-3) / scale)  # density per unit of NGP's space
-    logits = np.clip(rgb, 0.02, 0.98)
-    features[..., 1:] = np.log(logits / (1.0 - logits))
-    table = np.zeros((-(-(resolution**3) // 8) * 8, 4))
-    table[: resolution**3] = features.transpose(2, 1, 0, 3).reshape(-1, 4)  # x is fastest
-    mirrored = np.zeros((16, 16))
-    mirrored[range(4), range(4)], mirrored[range(4, 8), range(4)] = 1.0, -1.0
-    joined = np.zeros((16, 16))
-    joined[range(4), range(4)], joined[range(4), range(4, 8)] = 1.0, -1.0
-    first = np.zeros((16, 32))
-    first[:3, 1:4], first[3:6, 1:4] = np.eye(3), -np.eye(3)
-    last = np.zeros((16, 16))
-    last[:3, :3], last[:3, 3:6] = np.eye(3), -np.eye(3)
-    parts = [mirrored, joined, first, np.eye(16), last, table]
-    params = np.concatenate([part.reshape(-1) for part in parts]).astype("<f2")
+    features[..., 0] = np.log(np.maximum(sigma, 1e-3) * unit)
+    colors = np.clip(rgb, 0.02, 0.98)
+    features[..., 1:] = np.log(colors / (1.0 - colors))
+    return features.transpose(2, 1, 0, 3).reshape(-1, 4)  # x is fastest
+
+
+def passing(inputs: int, first: int, count: int, outputs: int, hidden: int = 1) -> list[Array]:
+    """Matrices [out,in] of a perceptron of width 16 that passes `count` inputs on: relu(h) - relu(-h)."""
+    mirrored, joined = np.zeros((16, inputs)), np.zeros((outputs, 16))
+    mirrored[:count, first : first + count] = np.eye(count)
+    mirrored[count : 2 * count, first : first + count] = -np.eye(count)
+    joined[:count, :count], joined[:count, count : 2 * count] = np.eye(count), -np.eye(count)
+    return [mirrored, *[np.eye(16)] * (hidden - 1), joined]
+
+
+def write_instant_ngp(path: Path) -> None:
+    """A snapshot with one dense level, and perceptrons that pass its four features on."""
+    scale, offset = 0.5 / HALF, np.full(3, 0.5)
+    table = dense_level(((vertices() - offset) / scale)[..., [2, 0, 1]], 1.0 / scale)
+    matrices = [passing(4, 0, 4, 16), passing(32, 1, 3, 3, hidden=2)]
+    params = np.concatenate([*(flat(part, 0.0) for part in matrices), table.reshape(-1)]).astype("<f2")
     content: dict[str, Any] = snapshot()
     content["encoding"] |= {
         "n_levels": 1,
-        "base_resolution": base,
+        "base_resolution": CELLS,
         "log2_hashmap_size": 3 * LEVELS,
         "per_level_scale": 2.0,
     }
@@ -112,6 +127,59 @@ def write_instant_ngp(path: Path) -> None:
         "metadata": [],
     }
     write(path, content)
+
+
+NERFACTO = f"""!!python/object:nerfstudio.engine.trainer.TrainerConfig
+method_name: nerfacto
+pipeline: !!python/object:nerfstudio.pipelines.base_pipeline.VanillaPipelineConfig
+  model: !!python/object:nerfstudio.models.nerfacto.NerfactoModelConfig
+    average_init_density: 1.0
+    background_color: white
+    disable_scene_contraction: true
+    far_plane: 8.0
+    hidden_dim: 16
+    hidden_dim_color: 16
+    num_levels: 1
+    base_res: {CELLS}
+    max_res: {CELLS}
+    log2_hashmap_size: {3 * LEVELS}
+    features_per_level: 4
+    num_nerf_samples_per_ray: 96
+    num_proposal_iterations: 2
+    num_proposal_samples_per_ray: !!python/tuple
+    - 128
+    - 64
+    proposal_initial_sampler: uniform
+    proposal_net_args_list:
+    - &id001
+      hidden_dim: 16
+      num_levels: 1
+      base_res: {CELLS}
+      max_res: {CELLS}
+      log2_hashmap_size: {3 * LEVELS}
+    - *id001
+"""
+"""A config.yml with nerfstudio's tags."""
+
+
+def write_nerfacto(folder: Path) -> None:
+    """A training's folder in tiny-cuda-nn's layout: grids of one dense level, not contracted."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "config.yml").write_text(NERFACTO, encoding="utf-8")
+    same = {"transform": np.eye(4)[:3].tolist(), "scale": 1.0}
+    (folder / "dataparser_transforms.json").write_text(json.dumps(same), encoding="utf-8")
+    table = dense_level((vertices() - 0.5) * (2.0 * HALF) + CENTER, 1.0).astype(np.float32)
+    values = {
+        "box": np.stack([CENTER - HALF, CENTER + HALF]).astype(np.float32),
+        "base": (passing(4, 0, 4, 16), ()),
+        "head": (passing(31, 16, 3, 3, hidden=2), ()),  # behind 16 terms of the direction
+        "proposals": [(passing(2, 0, 1, 1), ())] * 2,
+        "table": table,
+        "tables": [np.ascontiguousarray(table[:, :2])] * 2,
+        "appearance": None,
+    }
+    path = folder / "nerfstudio_models" / "step-000000000.ckpt"
+    write_checkpoint(path, values, "tcnn", garbage=0.0)
 
 
 def write_plenoctree(path: Path) -> None:

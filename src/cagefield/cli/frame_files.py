@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -121,12 +122,23 @@ class FrameFiles:
 
 @contextmanager
 def frames_folder(video: Path, keep: bool) -> Iterator[Path]:
-    """Folder of a video's frames beside it: NAME_frames, which stays, with `keep`; else a temporary one."""
+    """Folder of a video's frames beside it: NAME_frames, which stays, with `keep`; else a temporary one.
+
+    After a failure pictures of a temporary folder become NAME_frames, for `--keep`, unless that is there.
+    """
+    kept = video.with_name(f"{video.stem}_frames")
     if keep:
-        yield video.with_name(f"{video.stem}_frames")
+        yield kept
         return
     folder = video.absolute().with_name(hidden_name(video.with_suffix(""), "new"))
     try:
         yield folder
+    except BaseException:
+        count = sum(path.stem.isdigit() for path in folder.glob("*.png"))
+        if count and not kept.exists():
+            folder.rename(kept)
+            pictures = "1 picture stays" if count == 1 else f"{count} pictures stay"
+            warnings.warn(f"{pictures} in {kept}; go on with --keep", stacklevel=4)
+        raise
     finally:
         shutil.rmtree(folder, ignore_errors=True)

@@ -25,6 +25,7 @@ from cagefield.cluster.scheduler_address import (
     read_scheduler_file,
     wait_for_listener,
 )
+from cagefield.cluster.versions import check_versions
 from cagefield.errors import CagefieldError
 from cagefield.files.temporary_folders import TemporaryFolder
 
@@ -101,7 +102,8 @@ def check_installed() -> None:
 def connect(cluster: int | str, tls: TlsFiles | None = None) -> Iterator[Client]:
     """Client of a cluster with at least one worker; local workers end with the context.
 
-    Raises CagefieldError without the package, without a reply, and for `tls://` without certificates,
+    Raises CagefieldError without the package, without a reply, for `tls://` without certificates, and for a
+    scheduler or workers without the package or with another version of it (`check_versions`),
     LostClusterError for a cluster without workers (`patience`).
     """
     check_installed()
@@ -130,6 +132,8 @@ def connect(cluster: int | str, tls: TlsFiles | None = None) -> Iterator[Client]
             from cagefield.cluster.worker_plugin import LocalWorkerPlugin
 
             client.register_plugin(LocalWorkerPlugin())
+        else:
+            check_versions(client)
         yield client
 
 

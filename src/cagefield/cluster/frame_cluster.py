@@ -14,7 +14,6 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import cagefield
 from cagefield.cluster.connection import CLOSE_SECONDS, TlsFiles, connect
 from cagefield.cluster.frame_tasks import FrameJob, FrameResult, fit_depth_scale, render_frame, write_contents
 from cagefield.cluster.scene_archive import SceneArchive, SceneSource
@@ -84,7 +83,7 @@ def open_frame_cluster(
     workers are counted in a warning at the end.
 
     Raises:
-        CagefieldError: no package, no reply, workers with another version of cagefield.
+        CagefieldError: no package, no reply, another version of cagefield on the cluster.
         SceneError: workers do not see the folder of a scene that pastes from others.
     """
     if scene.folder is None:
@@ -116,23 +115,5 @@ def _forget(client: Client, name: str) -> None:
 
 
 def _all_see(client: Client, source: SceneSource) -> bool:
-    """Whether all workers have the scene folder. Raises CagefieldError for another version of cagefield."""
-    replies = client.run(_look, source, on_error="return")
-    for worker, reply in replies.items():
-        if isinstance(reply, Exception):
-            if isinstance(reply, ImportError | AttributeError):
-                raise CagefieldError(
-                    f"worker {worker} has no cagefield with clusters; pip install 'cagefield[cluster]' there"
-                )
-            return False  # the worker was lost, and another one will begin
-        if reply[0] != cagefield.__version__:
-            raise CagefieldError(
-                f"worker {worker} has cagefield {reply[0]}, this is {cagefield.__version__}; install the "
-                "same version everywhere"
-            )
-    return all(reply[1] for reply in replies.values())
-
-
-def _look(source: SceneSource) -> tuple[str, bool]:
-    """Version of cagefield on a worker, and whether the scene folder is there."""
-    return cagefield.__version__, source.is_here()
+    """Whether all workers have the scene folder; not where one was lost meanwhile."""
+    return all(reply is True for reply in client.run(source.is_here, on_error="return").values())

@@ -109,10 +109,10 @@ class HashGrid:
     def __str__(self) -> str:
         """Levels, resolutions, size."""
         finest = self.base * self.growth ** (self.levels - 1)
-        return (
-            f"{self.levels} levels {self.base} to {finest:.0f}, {self.table.shape[1]} features, "
-            f"2^{self.log2_size} entries"
-        )
+        levels = f"{self.levels} levels {self.base} to {finest:.0f}"
+        if self.levels == 1:
+            levels = f"1 level {self.base}"
+        return f"{levels}, {self.table.shape[1]} features, 2^{self.log2_size} entries"
 
 
 def entry_offsets(layout: str, resolutions: tuple[int, ...], log2_size: int) -> tuple[int, ...]:

@@ -124,10 +124,9 @@ class SvrasterField(ExternalField):
     def describe(self) -> str:
         """Voxels, levels and harmonics."""
         degree = round(self.sh.shape[1] ** 0.5) - 1
-        return (
-            f"SVRaster: {len(self.paths)} voxels of the levels {self.levels.min()} to {self.levels.max()}, "
-            f"SH degree {degree}"
-        )
+        low, high = int(self.levels.min()), int(self.levels.max())
+        levels = f"the levels {low} to {high}" if low < high else f"level {low}"
+        return f"SVRaster: {len(self.paths)} voxels of {levels}, SH degree {degree}"
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Voxels and values by name."""
