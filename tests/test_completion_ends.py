@@ -62,7 +62,7 @@ def test_the_strength_of_a_shade_is_measured_around_it() -> None:
 
     def strength(times: float, seen: object = visibility) -> float:
         weaker = dataclasses.replace(model, weights=tuple(times * w for w in model.weights))
-        context = EditContext.build(field, EditStack(), Edit.delete(cage()), weaker, False, True, None, seen)
+        context = EditContext.build(field, EditStack(), Edit.delete(cage()), weaker, seen)
         support = context.find_support()
         assert support is not None
         return fit_shadow_strength(

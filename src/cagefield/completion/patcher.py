@@ -27,11 +27,14 @@ from cagefield.completion.lighting.ambient_occlusion import (
 from cagefield.completion.pasting.paste_composite import composite_paste
 from cagefield.completion.pasting.paste_loader import PasteLoader
 from cagefield.completion.patch_cache import DiskCache
+from cagefield.completion.removal import Removal, remove_part
 from cagefield.completion.splat_patch import (
     SplatBlock,
+    SplatRemoval,
     build_splat_patch,
     extract_splat_block,
     relight_splats,
+    remove_splats,
 )
 from cagefield.completion.surfaces.splat_voxelization import voxelize_bounds
 from cagefield.completion.surfaces.surfels import Surfels
@@ -47,6 +50,9 @@ from cagefield.rendering.splats.splat_provenance import SplatSet
 
 MAX_CACHED_PATCHES = 16
 """Maximum number of patches in memory."""
+
+MAX_CACHED_REMOVALS = 2
+"""Maximum number of removals in memory: tens of megabytes each."""
 
 Key = tuple[object, ...]
 
@@ -84,6 +90,7 @@ class Patcher:
         self._disk_cache = DiskCache(self._field, cameras)
         self._cache: OrderedDict[Key, Patch | SplatPatch | PreparedEdit | None] = OrderedDict()
         self._light_block: tuple[Key, VoxelBlock | SplatBlock] | None = None
+        self._removals: OrderedDict[Key, Removal | SplatRemoval] = OrderedDict()
         self._directional_models: dict[tuple[float, float, float] | None, LightModel] = {}
         self._composites: OrderedDict[Key, Pasted] = OrderedDict()
         self.detours = DetourCache(self._field)
@@ -295,7 +302,11 @@ class Patcher:
         )
 
         def make() -> Patch | SplatPatch:
+            removal = None
+            if not isinstance(edit, Paste):
+                removal = self._removal(below, edit, model, visibility, preserve_opacity)
             if isinstance(self._content, VoxelField):
+                assert removal is None or isinstance(removal, Removal)
                 return build_patch(
                     self._content,
                     below,
@@ -305,7 +316,9 @@ class Patcher:
                     visibility=visibility,
                     preserve_opacity=preserve_opacity,
                     pasted=pasted,
+                    removal=removal,
                 )
+            assert removal is None or isinstance(removal, SplatRemoval)
             return build_splat_patch(
                 self._content,
                 below,
@@ -314,12 +327,50 @@ class Patcher:
                 include_destination=is_lit,
                 visibility=visibility,
                 pasted=pasted,
+                removed=removal,
             )
 
         inputs = ("patch", model, *below.steps, edit.ungraded, preserve_opacity)
         patch = self._disk_cache.get_or_make(inputs, make) if is_lit else make()
         self._store(final_key if is_lit else moving_key, patch)
         return patch
+
+    def _removal(
+        self,
+        below: PreparedStack,
+        edit: Discrete,
+        model: LightModel | None,
+        visibility: CameraVisibility | None,
+        preserve_opacity: bool,
+    ) -> Removal | SplatRemoval:
+        """Removal of the part of an edit, above those below: the same over all drags of the part."""
+        key: Key = (
+            *below.steps,
+            edit.inner,
+            edit.uncovers,
+            edit.fill,
+            model,
+            visibility is None,
+            preserve_opacity,
+        )
+        if key not in self._removals:
+            removal: Removal | SplatRemoval
+            if isinstance(self._content, VoxelField):
+                removal = remove_part(
+                    self._content,
+                    below,
+                    edit,
+                    model,
+                    visibility=visibility,
+                    preserve_opacity=preserve_opacity,
+                )
+            else:
+                removal = remove_splats(self._content, below, edit, model, visibility=visibility)
+            self._removals[key] = removal
+            while len(self._removals) > MAX_CACHED_REMOVALS:
+                self._removals.popitem(last=False)
+        self._removals.move_to_end(key)
+        return self._removals[key]
 
     def _build_light(self, below: PreparedStack, edit: Continuous, stage: PatchStage) -> PreparedEdit | None:
         """Edit that changes the light under a continuous one; None if no light changes, or none is known."""

@@ -46,11 +46,14 @@ class LightChange:
     log_ratio: Array
 
     @classmethod
-    def from_surfels(cls, block: GridBlock, surface: Surfels, logs: Array, spacing: float) -> LightChange:
+    def from_surfels(
+        cls, block: GridBlock, surface: Surfels, logs: Array, spacing: float, *, where: Mask | None = None
+    ) -> LightChange:
         """Change of light on a block's colored vertices, from log ratios [N] on surfels [N].
 
         spacing: distance of the surfels, world units. Vertices within MAX_LIGHT_DEPTH_VOXELS of a surface,
-        mostly beneath it, show through it, as fields are foggy there.
+        mostly beneath it, show through it, as fields are foggy there. With a mask `where` [X,Y,Z] only of
+        its vertices.
         """
         check_cancelled()
         changed_rows = np.flatnonzero(logs)
@@ -62,7 +65,9 @@ class LightChange:
             high = np.ceil(g.max(axis=0) + MAX_LIGHT_DEPTH_VOXELS).astype(np.int64) + 1
             box = tuple(slice(a, max(a, b)) for a, b in zip(low, high, strict=True))
             mask[box] = block.slot[box] >= 0
-            points, normals = block.positions(mask), block.normals[mask]
+            if where is not None:
+                mask &= where
+            points, normals = block.positions(mask), block.normals_at(mask)
 
             def mean_logs(part: slice) -> Array:
                 return _mean_logs(surface, logs, points[part], normals[part], radius, spacing)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from cagefield.completion.surfaces.near_masks import slices_around
 from cagefield.compute.cancellation import check_cancelled
 from cagefield.edits import EditMap
 from cagefield.edits.grade import grade_sh
@@ -37,6 +38,10 @@ SOLID_OPTICAL_DEPTH = 0.3
 
 OCCUPIED_OPTICAL_DEPTH = 0.12
 """Minimum optical depth per voxel of fog that counts as occupied in gaps of solid vertices."""
+
+
+NORMAL_REACH_VERTICES = 7
+"""Vertices around one that its normal depends on: the support of the Gaussian, and of the gradient."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +117,13 @@ class GridBlock:
         check_cancelled()
         length = np.sqrt(np.einsum("xyza,xyza->xyz", slope, slope))[..., None]
         return np.asarray(slope / np.maximum(length, 1e-6), np.float32)
+
+    def normals_at(self, mask: Mask) -> Float32:
+        """Unit normals [N,3] at the vertices of a mask [X,Y,Z]: `normals`, computed around the mask alone."""
+        around = slices_around(mask, NORMAL_REACH_VERTICES)
+        if "normals" in self.__dict__ or not mask[around].size:
+            return self.normals[mask]
+        return replace(self, density=self.density[around]).normals[mask[around]]
 
     def positions(self, mask: Mask) -> Array:
         """World positions [N,3] of the vertices of a mask [X,Y,Z]."""
@@ -263,14 +275,31 @@ def extract_block(
     canonical points, and colors are rotated; a vertex that the edits empty has neither. With
     `preserve_opacity` density is multiplied by |det J|^(1/3), the mean stretch over directions.
     """
-    check_cancelled()
+    low, shape = vertex_range(field, box)
+    return extract_vertices(field, below, low, shape, preserve_opacity=preserve_opacity)
+
+
+def vertex_range(field: VoxelField, box: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(lowest vertex [3], number of vertices [3]) of the part of a field's grid that holds a box [2,3]."""
     corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
     g = field.grid_coordinates(corners)
     last = np.array(field.resolution) - 1
     low = np.clip(np.floor(g.min(axis=0)).astype(np.int64) - 1, 0, np.maximum(last - 2, 0))
     high = np.minimum(np.ceil(g.max(axis=0)).astype(np.int64) + 1, last)
     # A normal needs three vertices along each axis.
-    shape = np.minimum(np.maximum(high - low + 1, 3), last - low + 1)
+    return low, np.minimum(np.maximum(high - low + 1, 3), last - low + 1)
+
+
+def extract_vertices(
+    field: VoxelField,
+    below: EditMap,
+    low: NDArray[np.int64],
+    shape: NDArray[np.int64],
+    *,
+    preserve_opacity: bool = True,
+) -> GridBlock:
+    """Block of `shape` [3] vertices of a field under edits, from vertex `low` [3] on (`extract_block`)."""
+    check_cancelled()
     block = _extract_stored(field, low, shape)
     if not below.steps:
         return block
