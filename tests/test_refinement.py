@@ -196,6 +196,7 @@ def test_light_around_a_cage_is_known_before_it_is_dragged(
 )
 def test_refinements_that_change_nothing_are_known(edit: Edit, attained: Refinement) -> None:
     patcher = Scene(ball_field(resolution=33)).patcher
-    assert attained_refinement(Refinement.DRAFT, [edit], patcher) == attained
+    patches = patcher.attained_stage(patcher.prepare([edit], stage=PatchStage.CACHED))
+    assert attained_refinement(Refinement.DRAFT, [edit], patches) == attained
     made = FINAL if edit.relight == "none" else Refinement.EXACT
-    assert attained_refinement(Refinement.EXACT, [edit], patcher) == (made if edit.enabled else FINAL)
+    assert attained_refinement(Refinement.EXACT, [edit], patches) == (made if edit.enabled else FINAL)

@@ -155,19 +155,35 @@ class Patcher:
             return replace(step, light=self._build_light(below, edit, stage))
         return step
 
-    def attained_stage(self, edits: Sequence[Edit]) -> PatchStage:
-        """Last stage whose patches are those of stage CACHED, whatever the cache holds: LIT without any."""
+    def attained_stage(self, prepared: PreparedStack, *, preserve_opacity: bool = True) -> PatchStage:
+        """Last stage whose patches the stack of `prepare` has already: LIT without any that is missing."""
         is_voxels = isinstance(self._field, VoxelField)
         known_dark = "light_model" in self.__dict__ and not self.light_model.has_effect
         attained = PatchStage.LIT
-        for edit in edits:
+        for number, step in enumerate(prepared):
+            edit, below = step.edit, PreparedStack(prepared.edits[:number])
             if isinstance(edit, Paste) and is_voxels and edit.enabled:
                 attained = min(attained, PatchStage.INPAINTED)  # composited with the field beneath
-            if needs_patch(edit, feathers=is_voxels):
-                return PatchStage.CACHED
-            if needs_relighting(edit) and not (known_dark and edit.relight == "occlusion"):
+            if isinstance(edit, Discrete) and needs_patch(edit, feathers=is_voxels):
+                attained = min(attained, self._patch_stage(below, step, preserve_opacity))
+            is_dark = known_dark and edit.relight == "occlusion"
+            if needs_relighting(edit) and step.light is None and not is_dark:
                 attained = min(attained, PatchStage.INPAINTED)
         return attained
+
+    def _patch_stage(self, below: PreparedStack, step: PreparedEdit, preserve_opacity: bool) -> PatchStage:
+        """Stage of the patch of a discrete edit, above those below."""
+        edit = step.edit
+        assert isinstance(edit, Discrete)
+        if step.patch is None or not self._is_model_known(edit):
+            return PatchStage.CACHED
+        model = self._model_for(edit)
+        has_light = model is not None and model.has_effect
+        final, moving, _ = self._patch_keys(below, edit, step.pasted, has_light, preserve_opacity)
+        stages = ((final, PatchStage.LIT), (moving, PatchStage.INPAINTED))
+        return next(
+            (stage for key, stage in stages if self._cache.get(key) is step.patch), PatchStage.CACHED
+        )
 
     def warm(
         self,
@@ -178,17 +194,25 @@ class Patcher:
     ) -> None:
         """Compute all that does not depend on where the next drag goes; `proceed` cancels.
 
-        These are the visibility and the light model of the field and, where the last of the edits is a
-        continuous one that relights, the block around its outer cage.
+        These are the visibility and the light model of the field and, of the last of the edits, of a
+        continuous one that relights the block around its outer cage, of a discrete one what its part leaves
+        behind.
         """
         with cancellable(proceed):
             _ = self.light_model
             last = edits[-1] if edits else None
-            if isinstance(last, Continuous) and last.relight != "none":
-                below = self.prepare(edits[:-1], preserve_opacity=preserve_opacity, proceed=proceed)
-                model = self._model_for(last)
-                if model is not None and model.has_effect:
+            if not isinstance(last, Continuous | Discrete) or isinstance(last, Paste):
+                return
+            below = self.prepare(edits[:-1], preserve_opacity=preserve_opacity, proceed=proceed)
+            model = self._model_for(last)
+            has_light = model is not None and model.has_effect
+            if isinstance(last, Continuous):
+                if has_light:
+                    assert model is not None
                     self._block_around(below, last, model)
+            elif has_light or (last.fill != "none" and last.uncovers):
+                used, visibility = self._inputs(last, model, is_lit=True)
+                self._removal(below, last, used, visibility, preserve_opacity)
 
     def _composite(
         self, below: PreparedStack, edit: Paste, pasted: Pasted, stage: PatchStage, preserve_opacity: bool
@@ -280,13 +304,7 @@ class Patcher:
         has_light = model_or_none is not None and model_or_none.has_effect
         if isinstance(edit, Paste) and not has_light:
             return None
-        feather = edit.feather if is_voxels else 0.0
-        kind = type(edit), edit.fill, feather, pasted, preserve_opacity
-        base_key: Key = (*below.steps, edit.inner, *kind, has_light and edit.relight)
-        shown = (edit.deformed, edit.mirrored) if has_light or feather > 0.0 else None
-        final_key: Key = (*base_key, shown)
-        moving_key: Key = (*base_key, "moving")
-        unlit_key: Key = (*below.steps, edit.inner, *kind, False, "moving")
+        final_key, moving_key, unlit_key = self._patch_keys(below, edit, pasted, has_light, preserve_opacity)
         for key in (final_key,) if is_lit else (final_key, moving_key):
             if key in self._cache:
                 self._cache.move_to_end(key)
@@ -295,11 +313,7 @@ class Patcher:
             return cast("Patch | SplatPatch | None", self._cache.get(unlit_key))
         if not needs_patch(edit, not is_lit, feathers=is_voxels):
             return None
-        model = model_or_none if has_light else None
-        needs_visibility = has_light or (edit.fill == "surroundings" and edit.uncovers)
-        visibility = (
-            self._visibility if needs_visibility and (is_lit or "_visibility" in self.__dict__) else None
-        )
+        model, visibility = self._inputs(edit, model_or_none, is_lit)
 
         def make() -> Patch | SplatPatch:
             removal = None
@@ -334,6 +348,32 @@ class Patcher:
         patch = self._disk_cache.get_or_make(inputs, make) if is_lit else make()
         self._store(final_key if is_lit else moving_key, patch)
         return patch
+
+    def _inputs(
+        self, edit: Discrete, model: LightModel | None, is_lit: bool
+    ) -> tuple[LightModel | None, CameraVisibility | None]:
+        """(light model, visibility) for the patch of an edit, as far as it needs them and they are known."""
+        used = model if model is not None and model.has_effect else None
+        needs_visibility = used is not None or (edit.fill == "surroundings" and edit.uncovers)
+        if not needs_visibility or not (is_lit or "_visibility" in self.__dict__):
+            return used, None
+        return used, self._visibility
+
+    def _patch_keys(
+        self,
+        below: PreparedStack,
+        edit: Discrete,
+        pasted: Pasted | None,
+        has_light: bool,
+        preserve_opacity: bool,
+    ) -> tuple[Key, Key, Key]:
+        """Keys of the patch of stage LIT, of that of INPAINTED, and of the latter without light."""
+        feather = edit.feather if isinstance(self._field, VoxelField) else 0.0
+        kind = type(edit), edit.fill, feather, pasted, preserve_opacity
+        base_key: Key = (*below.steps, edit.inner, *kind, has_light and edit.relight)
+        shown = (edit.deformed, edit.mirrored) if has_light or feather > 0.0 else None
+        unlit_key: Key = (*below.steps, edit.inner, *kind, False, "moving")
+        return (*base_key, shown), (*base_key, "moving"), unlit_key
 
     def _removal(
         self,

@@ -63,6 +63,12 @@ VIEW_INDEPENDENCE_WEIGHT = 0.01
 """Weight of the penalty on view-dependent coefficients."""
 
 
+def load_solvers() -> None:
+    """Load the libraries that inpainting needs, which takes about as long as to inpaint a small hole."""
+    import scipy.interpolate
+    import scipy.sparse.linalg  # noqa: F401
+
+
 def inpaint_support(
     block: GridBlock, footprint: Footprint, removed: Mask, *, keep_removed: bool = False
 ) -> GridBlock:

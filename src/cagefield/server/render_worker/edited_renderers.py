@@ -35,8 +35,8 @@ class PatchSource(Protocol):
     ) -> PreparedStack:
         """Stack of the edits with their patches of a stage (`Patcher.prepare`)."""
 
-    def attained_stage(self, edits: Sequence[Edit]) -> PatchStage:
-        """Last stage whose patches are those of stage CACHED (`Patcher.attained_stage`)."""
+    def attained_stage(self, prepared: PreparedStack, *, preserve_opacity: bool = ...) -> PatchStage:
+        """Last stage whose patches a stack of `prepare` has already (`Patcher.attained_stage`)."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,8 @@ class EditedRenderers:
         renderer = base.with_edits(
             stack, preserve_opacity=preserve_opacity, coarse=refinement.is_coarse, proceed=proceed
         )
-        attained = attained_refinement(refinement, wanted, self._patcher)
+        patches = self._patcher.attained_stage(stack, preserve_opacity=preserve_opacity)
+        attained = attained_refinement(refinement, wanted, patches)
         made = RefinedRenderer(wanted, preserve_opacity, attained, renderer)
         final = [kept for kept in self._kept if kept.refinement == FINAL]
         if attained == FINAL:
@@ -132,9 +133,11 @@ PATCH_STAGES = {
 """Patches of each refinement."""
 
 
-def attained_refinement(made: Refinement, edits: Sequence[Edit], patcher: PatchSource) -> Refinement:
-    """The last refinement that a picture of edits `made` with one has: those after it change nothing."""
-    patches = patcher.attained_stage(edits)
+def attained_refinement(made: Refinement, edits: Sequence[Edit], patches: PatchStage) -> Refinement:
+    """The last refinement that a picture of edits `made` with one has: those after it change nothing.
+
+    patches: the stage that the picture's patches have attained.
+    """
     is_coarse = made.is_coarse and any(
         isinstance(edit, Continuous) and edit.enabled and edit.changes_anything for edit in edits
     )

@@ -31,7 +31,7 @@ class Unpatched:
         """Stack of the edits alone, pastes left out."""
         return PreparedStack(edit for edit in edits if not isinstance(edit, Paste))
 
-    def attained_stage(self, edits: Sequence[Edit]) -> PatchStage:
+    def attained_stage(self, prepared: PreparedStack, *, preserve_opacity: bool = True) -> PatchStage:
         """The last stage: nothing refines a picture without patches."""
         return PatchStage.LIT
 
