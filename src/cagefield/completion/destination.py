@@ -20,8 +20,6 @@ from cagefield.completion.surfaces.patch_bounds import destination_box
 from cagefield.completion.surfaces.surfels import (
     Surfels,
     concatenate_surfels,
-    extract_surfels,
-    prefer_visible,
 )
 from cagefield.edits import Discrete, EditMap
 from cagefield.fields.voxel_field import VoxelField
@@ -148,10 +146,7 @@ def _surfels_beyond(removal: Removal, before: GridBlock, near: VertexRange) -> S
         return Surfels(np.zeros((0, 3)), np.zeros((0, 3)))
     context, crop = removal.context, beyond.grown(SURFACE_MARGIN_VERTICES)
     block = before.crop(crop.first - before.low, crop.last - before.low)
-    surface = extract_surfels(block)
-    if context.visibility is not None:
-        surface = prefer_visible(surface, context.visibility.surface.crop_to_block(block), context.voxel)
-    surface = surface.downsample(context.voxel)
+    surface = context.surfels_of(block)
     coordinates = own.block_coordinates(surface.points)
     is_own = ((coordinates >= 0.0) & (coordinates <= np.array(own.shape) - 1.0)).all(axis=1)
     return surface.take(~is_own)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.surfaces.block_union import part_slices
 from cagefield.completion.surfaces.footprint import CONTACT_DISTANCE_VOXELS
-from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
+from cagefield.completion.surfaces.grid_block import GridBlock, extract_block, extract_vertices
 from cagefield.completion.surfaces.near_masks import distances_near
 from cagefield.completion.surfaces.patch_bounds import SUPPORT_DISTANCE_VOXELS, patch_box
 from cagefield.completion.surfaces.plane_snapping import snap_to_planes
@@ -37,6 +37,9 @@ LIGHT_SPACING_SHARE = 1.0 / 16.0
 PROBE_DEPTH_VOXELS = 0.75
 """Depth beneath a surfel at which its membership in the part is tested, voxels."""
 
+MAX_SURFEL_VERTICES = 1 << 23
+"""Maximum number of vertices of a grid all of whose surfels are found at once, 203 along each axis."""
+
 MIN_LOG_CHANGE = 0.01
 """Minimum change of light (log); smaller ones are dropped."""
 
@@ -54,6 +57,7 @@ class EditContext:
         part: [X,Y,Z], mask of the solid vertices in V^c.
         visibility: the field's visible surfaces; None if unknown, or if edits below move the field.
         light_spacing: distance of the surfels on which light is computed, world units.
+        surfels: `extract_field_surfels` of the field; None if unknown, or if edits below move the field.
         pasted: all surfels with a paste; None of another edit.
     """
 
@@ -65,6 +69,7 @@ class EditContext:
     part: Mask
     visibility: CameraVisibility | None
     light_spacing: float
+    surfels: Surfels | None = None
     pasted: Surfels | None = None
 
     @classmethod
@@ -77,6 +82,7 @@ class EditContext:
         visibility: CameraVisibility | None = None,
         *,
         preserve_opacity: bool = True,
+        surfels: Surfels | None = None,
         after: VoxelField | None = None,
         pasted: Pasted | None = None,
     ) -> EditContext:
@@ -86,7 +92,7 @@ class EditContext:
         compose it from `pasted`, the content of the paste.
         """
         # The field's visible surfaces are not where the edits below have moved them.
-        visibility = None if below.steps else visibility
+        visibility, surfels = (None, None) if below.steps else (visibility, surfels)
         voxel = float(field.voxel_size.max())
         active_model = model if model is not None and model.has_effect else LightModel((), ())
         light_spacing = min(
@@ -110,6 +116,7 @@ class EditContext:
                 none,
                 visibility,
                 light_spacing,
+                surfels,
                 extract_surfels(block),
             )
         inside = _vertices_inside(before, edit.inner)
@@ -126,6 +133,7 @@ class EditContext:
             before.solid & inside,
             visibility,
             light_spacing,
+            surfels,
         )
 
     @cached_property
@@ -160,13 +168,16 @@ class EditContext:
         """Longest edge of a voxel, world units."""
         return max(self.before.spacing)
 
+    def surfels_of(self, block: GridBlock) -> Surfels:
+        """Surfels of a block of the field, a voxel apart: visible ones where cameras see the surface."""
+        if self.surfels is not None:
+            return self.surfels.crop_to_block(block)
+        return _extract_visible(block, self.visibility)
+
     @cached_property
     def _surfels(self) -> tuple[Surfels, NDArray[np.bool_]]:
         """(surfels before the edit, mask [N] of those of the part)."""
-        surface = extract_surfels(self.before)
-        if self.visibility is not None:
-            surface = prefer_visible(surface, self.visibility.surface.crop_to_block(self.before), self.voxel)
-        surface = surface.downsample(self.voxel)
+        surface = self.surfels_of(self.before)
         probes = surface.points - PROBE_DEPTH_VOXELS * self.voxel * surface.normals
         return surface, np.asarray(self.edit.inner.contains(probes) & (not isinstance(self.edit, Paste)))
 
@@ -201,6 +212,24 @@ class EditContext:
         if not self.edit.uncovers or not len(self.removed.points):
             return np.zeros(len(self.light_surfels.points))
         return -log_light_change(model, self.light_surfels, self.remaining, self.removed, self.voxel)
+
+
+def extract_field_surfels(field: VoxelField, visibility: CameraVisibility) -> Surfels | None:
+    """Surfels of a whole field, of which each edit takes those around it; None of a field too large."""
+    shape = np.array(field.resolution)
+    if shape.prod() > MAX_SURFEL_VERTICES:
+        return None
+    return _extract_visible(
+        extract_vertices(field, PreparedStack(), np.zeros(3, np.int64), shape), visibility
+    )
+
+
+def _extract_visible(block: GridBlock, visibility: CameraVisibility | None) -> Surfels:
+    """Surfels of a block, a voxel apart."""
+    surface, voxel = extract_surfels(block), max(block.spacing)
+    if visibility is not None:
+        surface = prefer_visible(surface, visibility.surface.crop_to_block(block), voxel)
+    return surface.downsample(voxel)
 
 
 def _vertices_inside(block: GridBlock, cage: Cage) -> Mask:

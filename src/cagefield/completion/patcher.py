@@ -18,6 +18,7 @@ from cagefield.completion.continuous_relighting import (
 )
 from cagefield.completion.detour_cache import DetourCache
 from cagefield.completion.discrete_patch import build_patch
+from cagefield.completion.edit_context import extract_field_surfels
 from cagefield.completion.lighting.ambient_occlusion import (
     LightModel,
     fit_light_model,
@@ -181,9 +182,7 @@ class Patcher:
         has_light = model is not None and model.has_effect
         final, moving, _ = self._patch_keys(below, edit, step.pasted, has_light, preserve_opacity)
         stages = ((final, PatchStage.LIT), (moving, PatchStage.INPAINTED))
-        return next(
-            (stage for key, stage in stages if self._cache.get(key) is step.patch), PatchStage.CACHED
-        )
+        return next((stage for key, stage in stages if self._cache.get(key) is step.patch), PatchStage.CACHED)
 
     def warm(
         self,
@@ -194,12 +193,12 @@ class Patcher:
     ) -> None:
         """Compute all that does not depend on where the next drag goes; `proceed` cancels.
 
-        These are the visibility and the light model of the field and, of the last of the edits, of a
-        continuous one that relights the block around its outer cage, of a discrete one what its part leaves
-        behind.
+        These are the visibility, the light model and the surfels of the field, and of the last of the edits,
+        if it is a continuous one that relights, the block around its outer cage, if it is a discrete one,
+        the removal of its part.
         """
         with cancellable(proceed):
-            _ = self.light_model
+            _ = self.light_model, self._surfels
             last = edits[-1] if edits else None
             if not isinstance(last, Continuous | Discrete) or isinstance(last, Paste):
                 return
@@ -277,6 +276,14 @@ class Patcher:
         )
         self._images.clear()
         return visibility
+
+    @cached_property
+    def _surfels(self) -> Surfels | None:
+        """Surfels of the whole field for discrete edits; None of splats, and of a field too large."""
+        if not isinstance(self._content, VoxelField):
+            return None
+        field, visibility = self._content, self._visibility
+        return self._disk_cache.get_or_make(("surfels",), lambda: extract_field_surfels(field, visibility))
 
     @property
     def visible_surfels(self) -> Surfels:
@@ -403,6 +410,7 @@ class Patcher:
                     model,
                     visibility=visibility,
                     preserve_opacity=preserve_opacity,
+                    surfels=None if visibility is None or below.steps else self._surfels,
                 )
             else:
                 removal = remove_splats(self._content, below, edit, model, visibility=visibility)

@@ -131,6 +131,7 @@ def remove_part(
     *,
     visibility: CameraVisibility | None = None,
     preserve_opacity: bool = True,
+    surfels: Surfels | None = None,
     after: VoxelField | None = None,
     pasted: Pasted | None = None,
 ) -> Removal:
@@ -141,11 +142,20 @@ def remove_part(
     Args:
         model: the light model, None to leave light as it is.
         visibility: visible surfaces of the field without edits, which are not inpainted.
+        surfels: `extract_field_surfels` of the field, if they are known.
         after: the field with a paste, if `edit` does not hold the paste's content.
         pasted: the content of a paste.
     """
     context = EditContext.build(
-        field, below, edit, model, visibility, preserve_opacity=preserve_opacity, after=after, pasted=pasted
+        field,
+        below,
+        edit,
+        model,
+        visibility,
+        preserve_opacity=preserve_opacity,
+        surfels=surfels,
+        after=after,
+        pasted=pasted,
     )
     light = footprint = support = None
     active_model = model if model is not None and model.has_effect else None
