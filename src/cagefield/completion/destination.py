@@ -21,6 +21,7 @@ from cagefield.completion.surfaces.surfels import (
     Surfels,
     concatenate_surfels,
 )
+from cagefield.compute.parallel_parts import run_both
 from cagefield.edits import Discrete, EditMap
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
@@ -169,9 +170,11 @@ def _light_change(
     onto = _onto_deformed(edit)
     in_part, moved = _move(onto, context.removed)
     moved_solid = concatenate_surfels([moved, _move(onto, removal.cut_faces)[1]])
-    log = removal.strength * log_light_change(model, light_surfels, remaining, moved_solid, voxel)
-    change = LightChange.from_surfels(under, light_surfels, log, spacing)
-    log = model.log_light([remaining, moved_solid], moved) - removal.log_light_on_part[in_part]
+    change_log, log = run_both(
+        lambda: log_light_change(model, light_surfels, remaining, moved_solid, voxel),
+        lambda: model.log_light([remaining, moved_solid], moved) - removal.log_light_on_part[in_part],
+    )
+    change = LightChange.from_surfels(under, light_surfels, removal.strength * change_log, spacing)
     log = np.where(np.abs(log) < MIN_LOG_CHANGE, 0.0, log)
     part = context.removed.take(in_part)
     on_part = LightChange.from_surfels(removal.part_block, part, log, spacing, where=removal.inside_part)

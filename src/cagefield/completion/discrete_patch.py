@@ -9,9 +9,11 @@ from cagefield.completion.lighting.light_change import apply_light
 from cagefield.completion.removal import Removal, remove_part
 from cagefield.completion.surfaces.block_union import embed_values
 from cagefield.completion.surfaces.visibility import CameraVisibility
+from cagefield.compute.parallel_parts import run_both
 from cagefield.edits import Delete, Discrete, EditMap, Paste
 from cagefield.edits.patch import Pasted, Patch
 from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
 
 
 def build_patch(
@@ -38,20 +40,30 @@ def build_patch(
     removal = removal or remove_part(
         field, below, edit, model, visibility=visibility, preserve_opacity=preserve_opacity, pasted=pasted
     )
+    shows_part = include_destination and not isinstance(edit, Delete | Paste)
     if not include_destination or isinstance(edit, Delete):
         placed = Destination.of_removal(removal)
     else:
         placed = place_part(removal, edit, FieldVertices(field, below, preserve_opacity))
-    mask = placed.under.changed_from(placed.before) | embed_values(
-        placed.before, removal.before, removal.inside
+    (region, under), part = run_both(
+        lambda: _changed_under(placed), lambda: _part(placed, below, visibility) if shows_part else None
     )
+    return Patch(region, under, part)
+
+
+def _changed_under(placed: Destination) -> tuple[Cage, VoxelField]:
+    """(cage around all changes, layer there without the part)."""
+    inside = embed_values(placed.before, placed.removal.before, placed.removal.inside)
+    mask = placed.under.changed_from(placed.before) | inside
     region, under = placed.under.crop_to_changes(mask, placed.region)
-    if not include_destination or isinstance(edit, Delete | Paste):
-        return Patch(region, under.to_layer())
-    part_block = apply_light(removal.part_block, placed.part_light)
-    if edit.fill != "none":
-        part_block = close_cut_end(
-            part_block, removal.inside_part, removal.context.removed, placed.part_light, below, visibility
-        )
-    part = placed.extract_part(part_block)
-    return Patch(region, under.to_layer(), None if part is None else part.to_layer())
+    return region, under.to_layer()
+
+
+def _part(placed: Destination, below: EditMap, visibility: CameraVisibility | None) -> VoxelField | None:
+    """Layer of the part as shown at its destination; None if it is unchanged."""
+    removal, light = placed.removal, placed.part_light
+    block = apply_light(removal.part_block, light)
+    if placed.edit.fill != "none":
+        block = close_cut_end(block, removal.inside_part, removal.context.removed, light, below, visibility)
+    part = placed.extract_part(block)
+    return None if part is None else part.to_layer()

@@ -29,6 +29,7 @@ from cagefield.completion.surfaces.near_masks import slices_around
 from cagefield.completion.surfaces.support_plane import Support
 from cagefield.completion.surfaces.surfels import Surfels, concatenate_surfels, extract_cut_faces
 from cagefield.completion.surfaces.visibility import MIN_VIEWS, CameraVisibility, count_edited_views
+from cagefield.compute.parallel_parts import run_both
 from cagefield.edits import Discrete, EditMap, Paste
 from cagefield.edits.options import Clone
 from cagefield.edits.patch import Pasted
@@ -157,30 +158,18 @@ def remove_part(
         after=after,
         pasted=pasted,
     )
-    light = footprint = support = None
     active_model = model if model is not None and model.has_effect else None
-    under, log_change, strength = context.emptied, np.zeros(len(context.light_surfels.points)), 1.0
-    part_support = context.find_support() if not isinstance(edit, Paste) else None
-    if active_model is not None:
-        if part_support is not None:
-            strength = fit_shadow_strength(
-                context.removed,
-                context.surroundings,
-                context.before,
-                edit.inner,
-                context.visibility,
-                active_model,
-                part_support,
-            )
-        log_change = strength * context.light_change_without_part(active_model)
-        light = LightChange.from_surfels(under, context.light_surfels, log_change, context.light_spacing)
-        under = apply_light(under, light)
-    if edit.fill == "surroundings" and edit.uncovers:
-        support = part_support
-    if support is not None:
-        shaded = context.light_surfels.take(log_change > MAX_TRUSTED_LOG_GAIN)
-        block_shaded = replace(shaded, points=under.block_coordinates(shaded.points))
-        footprint = build_footprint(support, context.part, context.contact, block_shaded)
+    _ = context.light_surfels  # known before two threads ask for them
+    (part_support, strength), log_change = run_both(
+        lambda: _find_support(context, active_model),
+        lambda: _light_change_without_part(context, active_model),
+    )
+    log_change = strength * log_change
+    support = part_support if edit.fill == "surroundings" and edit.uncovers else None
+    (under, light), footprint = run_both(
+        lambda: _with_new_light(context, active_model, log_change),
+        lambda: _build_footprint(context, support, log_change),
+    )
     if footprint is not None and visibility is not None:
         footprint = footprint.remove_free_space(
             count_edited_views(footprint.points(under), below, visibility, -FREE_SPACE_VOXELS * context.voxel)
@@ -197,6 +186,49 @@ def remove_part(
         cages = edit.inner, edit.fill.source
         under = clone_cage(under, below, cages, context.inside, context.surface, preserve_opacity)
     return Removal(context, active_model, under, light, footprint, strength)
+
+
+def _find_support(context: EditContext, model: LightModel | None) -> tuple[Support | None, float]:
+    """(support that the part stood on, strength of its shade on it)."""
+    support = None if isinstance(context.edit, Paste) else context.find_support()
+    if support is None or model is None:
+        return support, 1.0
+    return support, fit_shadow_strength(
+        context.removed,
+        context.surroundings,
+        context.before,
+        context.edit.inner,
+        context.visibility,
+        model,
+        support,
+    )
+
+
+def _light_change_without_part(context: EditContext, model: LightModel | None) -> Array:
+    """Log ratio of light [N] on the context's `light_surfels` for a strength of 1; 0 where light stays."""
+    if model is None:
+        return np.zeros(len(context.light_surfels.points))
+    return context.light_change_without_part(model)
+
+
+def _with_new_light(
+    context: EditContext, model: LightModel | None, log_change: Array
+) -> tuple[GridBlock, LightChange | None]:
+    """(block without the part in its new light, change of light or None), by logs [N] on surfels."""
+    if model is None:
+        return context.emptied, None
+    under = context.emptied
+    light = LightChange.from_surfels(under, context.light_surfels, log_change, context.light_spacing)
+    return apply_light(under, light), light
+
+
+def _build_footprint(context: EditContext, support: Support | None, log_change: Array) -> Footprint | None:
+    """Footprint of the part on its support, deep shade by logs [N] included; None without one."""
+    if support is None:
+        return None
+    shaded = context.light_surfels.take(log_change > MAX_TRUSTED_LOG_GAIN)
+    shaded = replace(shaded, points=context.before.block_coordinates(shaded.points))
+    return build_footprint(support, context.part, context.contact, shaded)
 
 
 def _with_light_change(footprint: Footprint, block: GridBlock, light: LightChange | None) -> Footprint:

@@ -113,7 +113,7 @@ class GridBlock:
         check_cancelled()
         smooth = ndimage.gaussian_filter(1.0 - np.exp(-self.depth), 1.2)
         check_cancelled()
-        slope = -np.stack(np.gradient(smooth), axis=-1) / self.field.voxel_size
+        slope = -np.stack(np.gradient(smooth), axis=-1) / self.field.voxel_size.astype(np.float32)
         check_cancelled()
         length = np.sqrt(np.einsum("xyza,xyza->xyz", slope, slope))[..., None]
         return np.asarray(slope / np.maximum(length, 1e-6), np.float32)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
 QUICK_LATTICE = 32
 """Most lattice nodes along an axis while a cage is dragged."""
 
+
+MAX_MERGED_SECONDS = 1.5
+"""Time in which holes are inpainted, up to which no picture comes before the final one: light takes no longer
+where all else is exact, and a picture on the way would delay it by a third."""
 
 KEPT_FINAL = 2
 """Final renderers that are kept: of the pages' pictures, and of a job's."""
@@ -96,17 +101,22 @@ class EditedRenderers:
             exact = (kept.edits for kept in self._kept if not kept.refinement.is_coarse)
             ready = {id(edit) for each in exact for edit in each}
             shown = [edit if id(edit) in ready else self._quickly(edit) for edit in shown]
+        began = time.perf_counter()
         stack = self._patcher.prepare(
             shown, stage=PATCH_STAGES[refinement], preserve_opacity=preserve_opacity, proceed=proceed
         )
+        patches = self._patcher.attained_stage(stack, preserve_opacity=preserve_opacity)
+        attained = attained_refinement(refinement, wanted, patches)
+        is_quick = time.perf_counter() - began < MAX_MERGED_SECONDS
+        if refinement is Refinement.INPAINTED and attained is Refinement.EXACT and is_quick:
+            stack = self._patcher.prepare(shown, preserve_opacity=preserve_opacity, proceed=proceed)
+            attained = FINAL
         # Occupancy under edits that both share is kept.
         alike = [kept for kept in self._kept if kept.refinement.is_coarse == refinement.is_coarse]
         base = (alike or self._kept)[-1].renderer if alike or self._kept else self._plain
         renderer = base.with_edits(
             stack, preserve_opacity=preserve_opacity, coarse=refinement.is_coarse, proceed=proceed
         )
-        patches = self._patcher.attained_stage(stack, preserve_opacity=preserve_opacity)
-        attained = attained_refinement(refinement, wanted, patches)
         made = RefinedRenderer(wanted, preserve_opacity, attained, renderer)
         final = [kept for kept in self._kept if kept.refinement == FINAL]
         if attained == FINAL:
