@@ -157,7 +157,10 @@ class Patcher:
         return step
 
     def attained_stage(self, prepared: PreparedStack, *, preserve_opacity: bool = True) -> PatchStage:
-        """Last stage whose patches the stack of `prepare` has already: LIT without any that is missing."""
+        """Last stage whose patches the stack of `prepare` has for certain: LIT where it needs none.
+
+        A patch that is there counts as INPAINTED, also where it is that of stage LIT.
+        """
         is_voxels = isinstance(self._field, VoxelField)
         known_dark = "light_model" in self.__dict__ and not self.light_model.has_effect
         attained = PatchStage.LIT
@@ -166,23 +169,23 @@ class Patcher:
             if isinstance(edit, Paste) and is_voxels and edit.enabled:
                 attained = min(attained, PatchStage.INPAINTED)  # composited with the field beneath
             if isinstance(edit, Discrete) and needs_patch(edit, feathers=is_voxels):
-                attained = min(attained, self._patch_stage(below, step, preserve_opacity))
+                has_patch = self._has_patch(below, step, preserve_opacity)
+                attained = min(attained, PatchStage.INPAINTED if has_patch else PatchStage.CACHED)
             is_dark = known_dark and edit.relight == "occlusion"
-            if needs_relighting(edit) and step.light is None and not is_dark:
+            if needs_relighting(edit) and not is_dark:
                 attained = min(attained, PatchStage.INPAINTED)
         return attained
 
-    def _patch_stage(self, below: PreparedStack, step: PreparedEdit, preserve_opacity: bool) -> PatchStage:
-        """Stage of the patch of a discrete edit, above those below."""
+    def _has_patch(self, below: PreparedStack, step: PreparedEdit, preserve_opacity: bool) -> bool:
+        """Whether a discrete edit, above those below, has its patch of stage INPAINTED or of LIT."""
         edit = step.edit
         assert isinstance(edit, Discrete)
         if step.patch is None or not self._is_model_known(edit):
-            return PatchStage.CACHED
+            return False
         model = self._model_for(edit)
         has_light = model is not None and model.has_effect
         final, moving, _ = self._patch_keys(below, edit, step.pasted, has_light, preserve_opacity)
-        stages = ((final, PatchStage.LIT), (moving, PatchStage.INPAINTED))
-        return next((stage for key, stage in stages if self._cache.get(key) is step.patch), PatchStage.CACHED)
+        return any(self._cache.get(key) is step.patch for key in (final, moving))
 
     def warm(
         self,

@@ -106,11 +106,13 @@ class EditedRenderers:
             shown, stage=PATCH_STAGES[refinement], preserve_opacity=preserve_opacity, proceed=proceed
         )
         patches = self._patcher.attained_stage(stack, preserve_opacity=preserve_opacity)
-        attained = attained_refinement(refinement, wanted, patches)
         is_quick = time.perf_counter() - began < MAX_MERGED_SECONDS
-        if refinement is Refinement.INPAINTED and attained is Refinement.EXACT and is_quick:
+        bends = any(isinstance(edit, Continuous) and _is_active(edit) for edit in wanted)
+        is_awaited = refinement in (Refinement.INPAINTED, Refinement.EXACT)
+        if is_awaited and is_quick and not bends and patches is PatchStage.INPAINTED:
+            refinement, patches = FINAL, PatchStage.LIT
             stack = self._patcher.prepare(shown, preserve_opacity=preserve_opacity, proceed=proceed)
-            attained = FINAL
+        attained = attained_refinement(refinement, wanted, patches, splits=not self._is_sampled)
         # Occupancy under edits that both share is kept.
         alike = [kept for kept in self._kept if kept.refinement.is_coarse == refinement.is_coarse]
         base = (alike or self._kept)[-1].renderer if alike or self._kept else self._plain
@@ -143,16 +145,23 @@ PATCH_STAGES = {
 """Patches of each refinement."""
 
 
-def attained_refinement(made: Refinement, edits: Sequence[Edit], patches: PatchStage) -> Refinement:
+def attained_refinement(
+    made: Refinement, edits: Sequence[Edit], patches: PatchStage, *, splits: bool
+) -> Refinement:
     """The last refinement that a picture of edits `made` with one has: those after it change nothing.
 
-    patches: the stage that the picture's patches have attained.
+    patches: the stage that the picture's patches have attained; splits: whether elements are split where an
+    edit cuts or bends them.
     """
     is_coarse = made.is_coarse and any(
-        isinstance(edit, Continuous) and edit.enabled and edit.changes_anything for edit in edits
+        _is_active(edit) and (splits or isinstance(edit, Continuous)) for edit in edits
     )
     if made < Refinement.INPAINTED and patches < PatchStage.INPAINTED:
         return made
     if is_coarse:
         return max(made, Refinement.INPAINTED)
     return max(made, Refinement.EXACT) if patches < PatchStage.LIT else FINAL
+
+
+def _is_active(edit: Edit) -> bool:
+    return edit.enabled and edit.changes_anything
