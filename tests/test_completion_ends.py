@@ -14,8 +14,8 @@ from cagefield.completion.edit_context import EditContext
 from cagefield.completion.inpainting.support_inpainting import inpaint_support
 from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.lighting.shadow_strength import MAX_STRENGTH, MIN_STRENGTH, fit_shadow_strength
+from cagefield.completion.surfaces.block_extraction import extract_block
 from cagefield.completion.surfaces.footprint import Footprint
-from cagefield.completion.surfaces.grid_block import extract_block
 from cagefield.completion.surfaces.support_plane import Support
 from cagefield.edits import Edit, EditStack, PreparedStack
 from cagefield.fields.voxel_field import VoxelField

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from cagefield.cameras.camera import Camera
-from cagefield.completion import patch_cache
+from cagefield.completion import patch_cache, removal_cache
 from cagefield.completion import patcher as patcher_module
 from cagefield.completion.lighting.ambient_occlusion import LightModel, occlusion_radii
-from cagefield.completion.patcher import PatchStage
+from cagefield.completion.patch_stages import PatchStage
 from cagefield.completion.surfaces import visibility
 from cagefield.edits import Edit, EditStack, Move
 from cagefield.fields.voxel_field import VoxelField
@@ -224,7 +224,7 @@ def test_what_a_part_leaves_is_found_once_for_all_its_drags(
     cache.warm_light(Shown(values_of((at_rest,))), lambda: None)
     assert len(patcher._removals) == 1
     for name in ("remove_part", "remove_splats"):
-        monkeypatch.setattr(patcher_module, name, lambda *args, **kwargs: pytest.fail("it is known"))
+        monkeypatch.setattr(removal_cache, name, lambda *args, **kwargs: pytest.fail("it is known"))
     for edit in (MOVED.translate((0.1, 0.0, 0.0)), MOVED):
         for stage in (PatchStage.INPAINTED, PatchStage.LIT):
             stack = patcher.prepare([edit], stage=stage)

@@ -14,8 +14,9 @@ from cagefield.completion.inpainting.feathering import feather_rim
 from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.lighting.light_change import LightChange, apply_light
 from cagefield.completion.removal import Removal
-from cagefield.completion.surfaces.block_union import VertexRange, embed_block, embed_values, extend_block
-from cagefield.completion.surfaces.grid_block import GridBlock, extract_vertices, vertex_range
+from cagefield.completion.surfaces.block_extraction import extract_vertices, vertex_range
+from cagefield.completion.surfaces.block_union import VertexRange, embed_block, embed_mask, extend_block
+from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.patch_bounds import destination_box
 from cagefield.completion.surfaces.surfels import (
     Surfels,
@@ -115,7 +116,7 @@ def place_part(removal: Removal, edit: Discrete, source: BlockSource) -> Destina
         0.0 if model is None else model.max_radius,
         shadow_directions=None if model is None else model.shadow_directions,
     )
-    near, region = VertexRange.of(removal.before), context.region
+    near, region = VertexRange.from_block(removal.before), context.region
     if box is not None:
         near, region = source.vertices(box), _union(region, box, context.voxel)
     before = extend_block(removal.before, near, source.extract)
@@ -123,7 +124,7 @@ def place_part(removal: Removal, edit: Discrete, source: BlockSource) -> Destina
     if before is not removal.before:
         under = embed_block(before, under)
         if light is not None:
-            light = LightChange(embed_values(before, removal.before, light.mask), light.log_ratio)
+            light = LightChange(embed_mask(before, removal.before, light.mask), light.log_ratio)
     if model is None or light is None:
         return Destination(removal, edit, region, before, under, light, None)
     remaining = concatenate_surfels([removal.remaining, _surfels_beyond(removal, before, near)])
@@ -142,7 +143,7 @@ def _union(region: Cage, box: Array, voxel: float) -> Cage:
 def _surfels_beyond(removal: Removal, before: GridBlock, near: VertexRange) -> Surfels:
     """Surfels in a range of vertices of a block, beyond the block of a removal."""
     own = removal.before
-    beyond = near.beyond(VertexRange.of(own))
+    beyond = near.beyond(VertexRange.from_block(own))
     if beyond is None:
         return Surfels(np.zeros((0, 3)), np.zeros((0, 3)))
     context, crop = removal.context, beyond.grown(SURFACE_MARGIN_VERTICES)
@@ -150,7 +151,7 @@ def _surfels_beyond(removal: Removal, before: GridBlock, near: VertexRange) -> S
     surface = context.surfels_of(block)
     coordinates = own.block_coordinates(surface.points)
     is_own = ((coordinates >= 0.0) & (coordinates <= np.array(own.shape) - 1.0)).all(axis=1)
-    return surface.take(~is_own)
+    return surface.take(np.asarray(~is_own))
 
 
 def _light_change(

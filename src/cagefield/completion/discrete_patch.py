@@ -7,7 +7,7 @@ from cagefield.completion.inpainting.end_caps import close_cut_end
 from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.lighting.light_change import apply_light
 from cagefield.completion.removal import Removal, remove_part
-from cagefield.completion.surfaces.block_union import embed_values
+from cagefield.completion.surfaces.block_union import embed_mask
 from cagefield.completion.surfaces.visibility import CameraVisibility
 from cagefield.compute.parallel_parts import run_both
 from cagefield.edits import Delete, Discrete, EditMap, Paste
@@ -53,7 +53,7 @@ def build_patch(
 
 def _changed_under(placed: Destination) -> tuple[Cage, VoxelField]:
     """(cage around all changes, layer there without the part)."""
-    inside = embed_values(placed.before, placed.removal.before, placed.removal.inside)
+    inside = embed_mask(placed.before, placed.removal.before, placed.removal.inside)
     mask = placed.under.changed_from(placed.before) | inside
     region, under = placed.under.crop_to_changes(mask, placed.region)
     return region, under.to_layer()

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.completion.lighting.ambient_occlusion import LightModel
+from cagefield.completion.surfaces.block_extraction import extract_block, extract_vertices
 from cagefield.completion.surfaces.block_union import part_slices
 from cagefield.completion.surfaces.footprint import CONTACT_DISTANCE_VOXELS
-from cagefield.completion.surfaces.grid_block import GridBlock, extract_block, extract_vertices
+from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.near_masks import distances_near
 from cagefield.completion.surfaces.patch_bounds import SUPPORT_DISTANCE_VOXELS, patch_box
 from cagefield.completion.surfaces.plane_snapping import snap_to_planes

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from enum import IntEnum
 from functools import cached_property
-from typing import cast
+from typing import Any, cast
 
 from cagefield.cameras.camera import Camera
 from cagefield.completion.continuous_relighting import (
@@ -28,20 +28,21 @@ from cagefield.completion.lighting.ambient_occlusion import (
 from cagefield.completion.pasting.paste_composite import composite_paste
 from cagefield.completion.pasting.paste_loader import PasteLoader
 from cagefield.completion.patch_cache import DiskCache
-from cagefield.completion.removal import Removal, remove_part
+from cagefield.completion.patch_stages import PatchStage, needs_patch, needs_relighting
+from cagefield.completion.removal import Removal
+from cagefield.completion.removal_cache import RemovalCache
 from cagefield.completion.splat_patch import (
     SplatBlock,
     SplatRemoval,
     build_splat_patch,
     extract_splat_block,
     relight_splats,
-    remove_splats,
 )
 from cagefield.completion.surfaces.splat_voxelization import voxelize_bounds
 from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.completion.surfaces.visibility import CameraVisibility, render_visibility
 from cagefield.compute.cancellation import cancellable, check_cancelled
-from cagefield.edits import Continuous, Delete, Discrete, Edit, Paste, PreparedEdit, PreparedStack
+from cagefield.edits import Continuous, Discrete, Edit, Paste, PreparedEdit, PreparedStack
 from cagefield.edits.options import CastShadow
 from cagefield.edits.patch import Pasted, Patch, SplatPatch
 from cagefield.fields.splat_field import SplatField
@@ -52,23 +53,7 @@ from cagefield.rendering.splats.splat_provenance import SplatSet
 MAX_CACHED_PATCHES = 16
 """Maximum number of patches in memory."""
 
-MAX_CACHED_REMOVALS = 2
-"""Maximum number of removals in memory: tens of megabytes each."""
-
 Key = tuple[object, ...]
-
-
-class PatchStage(IntEnum):
-    """Stages of the patches of a stack, each with all of those before.
-
-    CACHED: patches in the cache alone, none is computed. INPAINTED: holes are inpainted, without the light at
-    the destination of a discrete edit and that of a continuous one, so that no patch depends on where an
-    edit takes its content. LIT: light, feathered seams.
-    """
-
-    CACHED = 0
-    INPAINTED = 1
-    LIT = 2
 
 
 class Patcher:
@@ -91,7 +76,7 @@ class Patcher:
         self._disk_cache = DiskCache(self._field, cameras)
         self._cache: OrderedDict[Key, Patch | SplatPatch | PreparedEdit | None] = OrderedDict()
         self._light_block: tuple[Key, VoxelBlock | SplatBlock] | None = None
-        self._removals: OrderedDict[Key, Removal | SplatRemoval] = OrderedDict()
+        self._removals = RemovalCache(self._content, lambda: self._surfels)
         self._directional_models: dict[tuple[float, float, float] | None, LightModel] = {}
         self._composites: OrderedDict[Key, Pasted] = OrderedDict()
         self.detours = DetourCache(self._field)
@@ -184,8 +169,8 @@ class Patcher:
             return False
         model = self._model_for(edit)
         has_light = model is not None and model.has_effect
-        final, moving, _ = self._patch_keys(below, edit, step.pasted, has_light, preserve_opacity)
-        return any(self._cache.get(key) is step.patch for key in (final, moving))
+        keys = self._patch_keys(below, edit, step.pasted, has_light, preserve_opacity)[:2]
+        return any(self._cache.get(key) is step.patch for key in keys)
 
     def warm(
         self,
@@ -214,7 +199,7 @@ class Patcher:
                     self._block_around(below, last, model)
             elif has_light or (last.fill != "none" and last.uncovers):
                 used, visibility = self._inputs(last, model, is_lit=True)
-                self._removal(below, last, used, visibility, preserve_opacity)
+                self._removals.get_or_make(below, last, used, visibility, preserve_opacity)
 
     def _composite(
         self, below: PreparedStack, edit: Paste, pasted: Pasted, stage: PatchStage, preserve_opacity: bool
@@ -283,10 +268,10 @@ class Patcher:
     @cached_property
     def _surfels(self) -> Surfels | None:
         """Surfels of the whole field for discrete edits; None of splats, and of a field too large."""
-        if not isinstance(self._content, VoxelField):
+        if not isinstance(field := self._content, VoxelField):
             return None
-        field, visibility = self._content, self._visibility
-        return self._disk_cache.get_or_make(("surfels",), lambda: extract_field_surfels(field, visibility))
+        make = functools.partial(extract_field_surfels, field, self._visibility)
+        return self._disk_cache.get_or_make(("surfels",), make)
 
     @property
     def visible_surfels(self) -> Surfels:
@@ -326,33 +311,15 @@ class Patcher:
         model, visibility = self._inputs(edit, model_or_none, is_lit)
 
         def make() -> Patch | SplatPatch:
-            removal = None
+            removal: Removal | SplatRemoval | None = None
             if not isinstance(edit, Paste):
-                removal = self._removal(below, edit, model, visibility, preserve_opacity)
+                removal = self._removals.get_or_make(below, edit, model, visibility, preserve_opacity)
+            common: dict[str, Any] = {"include_destination": is_lit, "removal": removal}
+            common |= {"visibility": visibility, "pasted": pasted}
             if isinstance(self._content, VoxelField):
-                assert removal is None or isinstance(removal, Removal)
-                return build_patch(
-                    self._content,
-                    below,
-                    edit,
-                    model,
-                    include_destination=is_lit,
-                    visibility=visibility,
-                    preserve_opacity=preserve_opacity,
-                    pasted=pasted,
-                    removal=removal,
-                )
-            assert removal is None or isinstance(removal, SplatRemoval)
-            return build_splat_patch(
-                self._content,
-                below,
-                edit,
-                model,
-                include_destination=is_lit,
-                visibility=visibility,
-                pasted=pasted,
-                removed=removal,
-            )
+                common["preserve_opacity"] = preserve_opacity
+                return build_patch(self._content, below, edit, model, **common)
+            return build_splat_patch(self._content, below, edit, model, **common)
 
         inputs = ("patch", model, *below.steps, edit.ungraded, preserve_opacity)
         patch = self._disk_cache.get_or_make(inputs, make) if is_lit else make()
@@ -384,44 +351,6 @@ class Patcher:
         shown = (edit.deformed, edit.mirrored) if has_light or feather > 0.0 else None
         unlit_key: Key = (*below.steps, edit.inner, *kind, False, "moving")
         return (*base_key, shown), (*base_key, "moving"), unlit_key
-
-    def _removal(
-        self,
-        below: PreparedStack,
-        edit: Discrete,
-        model: LightModel | None,
-        visibility: CameraVisibility | None,
-        preserve_opacity: bool,
-    ) -> Removal | SplatRemoval:
-        """Removal of the part of an edit, above those below: the same over all drags of the part."""
-        key: Key = (
-            *below.steps,
-            edit.inner,
-            edit.uncovers,
-            edit.fill,
-            model,
-            visibility is None,
-            preserve_opacity,
-        )
-        if key not in self._removals:
-            removal: Removal | SplatRemoval
-            if isinstance(self._content, VoxelField):
-                removal = remove_part(
-                    self._content,
-                    below,
-                    edit,
-                    model,
-                    visibility=visibility,
-                    preserve_opacity=preserve_opacity,
-                    surfels=None if visibility is None or below.steps else self._surfels,
-                )
-            else:
-                removal = remove_splats(self._content, below, edit, model, visibility=visibility)
-            self._removals[key] = removal
-            while len(self._removals) > MAX_CACHED_REMOVALS:
-                self._removals.popitem(last=False)
-        self._removals.move_to_end(key)
-        return self._removals[key]
 
     def _build_light(self, below: PreparedStack, edit: Continuous, stage: PatchStage) -> PreparedEdit | None:
         """Edit that changes the light under a continuous one; None if no light changes, or none is known."""
@@ -471,27 +400,3 @@ class Patcher:
         self._cache[key] = value
         while len(self._cache) > MAX_CACHED_PATCHES:
             self._cache.popitem(last=False)
-
-
-def needs_patch(edit: Edit, moving: bool = False, *, feathers: bool = True) -> bool:
-    """Whether an enabled discrete edit leaves something to inpaint, to relight or to feather.
-
-    `feathers`: whether the field's kind has seams to feather; splats have none.
-    """
-    if not isinstance(edit, Discrete) or not (edit.enabled and edit.changes_geometry):
-        return False
-    seam = feathers and edit.feather > 0.0
-    if not edit.uncovers:
-        return not moving and (edit.relight != "none" or seam)
-    return edit.fill != "none" or edit.relight != "none" or (seam and not isinstance(edit, Delete))
-
-
-def needs_relighting(edit: Edit) -> bool:
-    """Whether an edit is an enabled, possible continuous one that relights."""
-    return (
-        isinstance(edit, Continuous)
-        and edit.enabled
-        and edit.changes_geometry
-        and edit.relight != "none"
-        and edit.is_possible
-    )

@@ -26,13 +26,9 @@ from cagefield.completion.inpainting.splat_inpainting import NO_SPLATS, KnownSpl
 from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.lighting.light_change import LightChange
 from cagefield.completion.removal import Removal, remove_part
-from cagefield.completion.surfaces.block_union import VertexRange, embed_values
-from cagefield.completion.surfaces.grid_block import (
-    GridBlock,
-    extract_block,
-    extract_vertices,
-    world_positions,
-)
+from cagefield.completion.surfaces.block_extraction import extract_block, extract_vertices
+from cagefield.completion.surfaces.block_union import VertexRange, embed_mask
+from cagefield.completion.surfaces.grid_block import GridBlock, world_positions
 from cagefield.completion.surfaces.patch_bounds import patch_box
 from cagefield.completion.surfaces.splat_voxelization import (
     choose_voxel_size,
@@ -130,19 +126,19 @@ def build_splat_patch(
     include_destination: bool = True,
     visibility: CameraVisibility | None = None,
     pasted: Pasted | None = None,
-    removed: SplatRemoval | None = None,
+    removal: SplatRemoval | None = None,
 ) -> SplatPatch:
     """Patch of a discrete edit of splats under the edits below; arguments as in `build_patch`.
 
-    `removed` is its `remove_splats`, if that is known.
+    `removal` is its `remove_splats`, if that is known.
     """
-    removed = removed or remove_splats(splats, below, edit, model, visibility=visibility, pasted=pasted)
-    removal = removed.removal
-    placed = Destination.of_removal(removal)
+    removed = removal or remove_splats(splats, below, edit, model, visibility=visibility, pasted=pasted)
+    of_block = removed.removal
+    placed = Destination.of_removal(of_block)
     if include_destination and not isinstance(edit, Delete):
-        placed = place_part(removal, edit.replace(feather=0.0), SplatVertices(removed))
-    part = None if placed.part_light is None else _to_new_light(removal.part_block, placed.part_light)
-    is_new = embed_values(placed.before, removal.before, removed.is_new)
+        placed = place_part(of_block, edit.replace(feather=0.0), SplatVertices(removed))
+    part = None if placed.part_light is None else _to_new_light(of_block.part_block, placed.part_light)
+    is_new = embed_mask(placed.before, of_block.before, removed.is_new)
     light = _to_new_light(placed.under, placed.light)
     return removed.known.build_patch(removed.scene, placed.region, is_new, light, part, removed.new)
 

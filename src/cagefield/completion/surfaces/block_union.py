@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.completion.surfaces.grid_block import GridBlock
-from cagefield.typing import Array
+from cagefield.typing import Mask
 
 Extract: TypeAlias = Callable[[NDArray[np.int64], NDArray[np.int64]], GridBlock]
 """Block of `shape` [3] vertices from vertex `low` [3] on, both numbered in the grid of another block."""
@@ -28,7 +28,7 @@ class VertexRange:
     last: NDArray[np.int64]
 
     @classmethod
-    def of(cls, block: GridBlock) -> VertexRange:
+    def from_block(cls, block: GridBlock) -> VertexRange:
         """All vertices of a block."""
         return cls(np.asarray(block.low), block.low + np.array(block.shape) - 1)
 
@@ -71,7 +71,7 @@ class VertexRange:
 
 def extend_block(block: GridBlock, vertices: VertexRange, extract: Extract) -> GridBlock:
     """Block A with all vertices of a range as well; `extract` gives those that A has not."""
-    own = VertexRange.of(block)
+    own = VertexRange.from_block(block)
     union = own.union(vertices)
     beyond = union.beyond(own)
     if beyond is None:
@@ -98,10 +98,10 @@ def embed_block(block: GridBlock, part: GridBlock) -> GridBlock:
     return replace(block, density=density, slot=slot, sh=np.concatenate([block.sh, part.sh]))
 
 
-def embed_values(block: GridBlock, part: GridBlock, values: Array) -> Array:
-    """Values [X,Y,Z] of a block's vertices: those [x,y,z] of a part of it, 0 elsewhere."""
-    embedded = np.zeros(block.shape, values.dtype)
-    embedded[part_slices(block, part)] = values
+def embed_mask(block: GridBlock, part: GridBlock, mask: Mask) -> Mask:
+    """Mask [X,Y,Z] of a block's vertices: those of a mask [x,y,z] of a part of it."""
+    embedded = np.zeros(block.shape, bool)
+    embedded[part_slices(block, part)] = mask
     return embedded
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from cagefield.completion.patcher import PatchStage
+from cagefield.completion.patch_stages import PatchStage
 from cagefield.edits import Continuous, Edit, PreparedStack
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.render_worker.refinement import FINAL, Refinement

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 
-from cagefield.completion.patcher import PatchStage
+from cagefield.completion.patch_stages import PatchStage
 from cagefield.edits import Edit, Paste, PreparedStack
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
