@@ -90,7 +90,9 @@ class Removal:
 
     @cached_property
     def part_block(self) -> GridBlock:
-        """The part of the block before around V^c."""
+        """The part of the block before around V^c; all of it where V^c lies beyond the field's grid."""
+        if not self.inside.any():
+            return self.before
         slices = slices_around(self.inside, PART_MARGIN_VERTICES)
         first, end = (np.array([getattr(each, name) for each in slices]) for name in ("start", "stop"))
         return self.before.crop(first, end - 1)
