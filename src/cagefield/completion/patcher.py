@@ -167,8 +167,7 @@ class Patcher:
         assert isinstance(edit, Discrete)
         if step.patch is None or not self._is_model_known(edit):
             return False
-        model = self._model_for(edit)
-        has_light = model is not None and model.has_effect
+        has_light = (model := self._model_for(edit)) is not None and model.has_effect
         keys = self._patch_keys(below, edit, step.pasted, has_light, preserve_opacity)[:2]
         return any(self._cache.get(key) is step.patch for key in keys)
 
@@ -191,8 +190,7 @@ class Patcher:
             if not isinstance(last, Continuous | Discrete) or isinstance(last, Paste):
                 return
             below = self.prepare(edits[:-1], preserve_opacity=preserve_opacity, proceed=proceed)
-            model = self._model_for(last)
-            has_light = model is not None and model.has_effect
+            has_light = (model := self._model_for(last)) is not None and model.has_effect
             if isinstance(last, Continuous):
                 if has_light:
                     assert model is not None
@@ -317,7 +315,7 @@ class Patcher:
             common: dict[str, Any] = {"include_destination": is_lit, "removal": removal}
             common |= {"visibility": visibility, "pasted": pasted}
             if isinstance(self._content, VoxelField):
-                common["preserve_opacity"] = preserve_opacity
+                common |= {"preserve_opacity": preserve_opacity}
                 return build_patch(self._content, below, edit, model, **common)
             return build_splat_patch(self._content, below, edit, model, **common)
 
