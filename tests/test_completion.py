@@ -15,9 +15,9 @@ from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion.discrete_patch import build_patch
 from cagefield.completion.inpainting.support_inpainting import solve_membrane
 from cagefield.completion.lighting.ambient_occlusion import LightModel
-from cagefield.completion.patcher import PatchStage, needs_patch
+from cagefield.completion.patch_stages import PatchStage, needs_patch
+from cagefield.completion.surfaces.block_extraction import extract_block, interpolate_field
 from cagefield.completion.surfaces.footprint import Footprint
-from cagefield.completion.surfaces.grid_block import extract_block, interpolate_field
 from cagefield.completion.surfaces.support_plane import Support
 from cagefield.completion.surfaces.visibility import render_visibility
 from cagefield.edits import Edit, EditStack, PreparedEdit, PreparedStack, dump_edits, parse_edits

@@ -14,8 +14,8 @@ from cagefield.completion.edit_context import EditContext
 from cagefield.completion.inpainting.support_inpainting import inpaint_support
 from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.lighting.shadow_strength import MAX_STRENGTH, MIN_STRENGTH, fit_shadow_strength
+from cagefield.completion.surfaces.block_extraction import extract_block
 from cagefield.completion.surfaces.footprint import Footprint
-from cagefield.completion.surfaces.grid_block import extract_block
 from cagefield.completion.surfaces.support_plane import Support
 from cagefield.edits import Edit, EditStack, PreparedStack
 from cagefield.fields.voxel_field import VoxelField
@@ -62,7 +62,7 @@ def test_the_strength_of_a_shade_is_measured_around_it() -> None:
 
     def strength(times: float, seen: object = visibility) -> float:
         weaker = dataclasses.replace(model, weights=tuple(times * w for w in model.weights))
-        context = EditContext.build(field, EditStack(), Edit.delete(cage()), weaker, False, True, None, seen)
+        context = EditContext.build(field, EditStack(), Edit.delete(cage()), weaker, seen)
         support = context.find_support()
         assert support is not None
         return fit_shadow_strength(

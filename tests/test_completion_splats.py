@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion.continuous_relighting import light_edit
 from cagefield.completion.lighting.ambient_occlusion import LightModel
-from cagefield.completion.patcher import Patcher, PatchStage
+from cagefield.completion.patch_stages import PatchStage
+from cagefield.completion.patcher import Patcher
 from cagefield.completion.splat_patch import build_splat_patch
 from cagefield.completion.surfaces.splat_voxelization import voxelize_splats
 from cagefield.edits import Edit, EditStack, PreparedEdit, PreparedStack

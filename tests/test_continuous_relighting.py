@@ -12,9 +12,10 @@ from scipy import ndimage
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion.continuous_relighting import relight_voxels
 from cagefield.completion.lighting.ambient_occlusion import LightModel
-from cagefield.completion.patcher import Patcher, PatchStage
+from cagefield.completion.patch_stages import PatchStage
+from cagefield.completion.patcher import Patcher
 from cagefield.completion.splat_patch import relight_splats
-from cagefield.completion.surfaces.grid_block import extract_block
+from cagefield.completion.surfaces.block_extraction import extract_block
 from cagefield.edits import Edit, EditStack, PreparedEdit, PreparedStack
 from cagefield.edits.patch import SplatPatch
 from cagefield.fields.sh import C0

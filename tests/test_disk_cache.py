@@ -18,7 +18,8 @@ from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.lighting.diffuse_irradiance import DiffuseLight
 from cagefield.completion.lighting.directional_light import DirectionalLight
 from cagefield.completion.patch_cache import DiskCache
-from cagefield.completion.patcher import Patcher, PatchStage
+from cagefield.completion.patch_stages import PatchStage
+from cagefield.completion.patcher import Patcher
 from cagefield.edits import Edit, EditStack, PreparedEdit
 from cagefield.edits.patch import NewLight, Patch, SplatPatch
 from cagefield.fields.voxel_field import VoxelField

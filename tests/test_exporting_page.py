@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.cameras.keyframe_files import dump_path
 from cagefield.cameras.keyframes import Keyframe, Timeline
-from cagefield.completion.patcher import Patcher, PatchStage
+from cagefield.completion.patch_stages import PatchStage
+from cagefield.completion.patcher import Patcher
 from cagefield.edits import Continuous, Edit, EditStack, Move, PreparedEdit, PreparedStack
 from cagefield.edits.partial_edit import partial_edit
 from cagefield.edits.patch import Patch

@@ -8,8 +8,9 @@ import numpy as np
 
 from cagefield.completion.inpainting.support_inpainting import inpaint_support
 from cagefield.completion.lighting.light_change import LightChange
+from cagefield.completion.surfaces.block_extraction import extract_block
 from cagefield.completion.surfaces.footprint import Footprint, build_footprint
-from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
+from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.support_plane import Support
 from cagefield.completion.surfaces.surfels import Surfels, extract_surfels
 from cagefield.edits import EditStack

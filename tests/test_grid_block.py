@@ -7,7 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
+from cagefield.completion.surfaces.block_extraction import extract_block
+from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.edits import EditStack
 from scenes import ball_field
 

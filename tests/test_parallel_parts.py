@@ -9,7 +9,7 @@ import pytest
 
 from cagefield.compute import devices
 from cagefield.compute.cancellation import cancellable, check_cancelled
-from cagefield.compute.parallel_parts import map_parts
+from cagefield.compute.parallel_parts import map_parts, run_both
 
 
 class CancelledError(Exception):
@@ -69,3 +69,33 @@ def test_parts_of_parts_start_no_threads(threads: int) -> None:
     found = [pair for each in map_parts(work, 6, 1) for pair in each]
     assert len(found) == 48 and all(outer == inner for outer, inner in found)
     assert map_parts(lambda part: part.stop, 4, 2) == [2, 4]
+
+
+def test_two_functions_run_in_the_callers_scope_of_cancellation(threads: int) -> None:
+    own: list[int] = []
+
+    def work(value: int) -> int:
+        own.append(threading.get_ident())
+        check_cancelled()
+        return value
+
+    assert run_both(lambda: work(1), lambda: work(2)) == (1, 2)
+    assert len(set(own)) == min(threads, 2)
+
+    def cancel() -> None:
+        if threading.get_ident() != own[0] or threads < 2:
+            raise CancelledError
+
+    with cancellable(cancel), pytest.raises(CancelledError):
+        run_both(lambda: work(1), lambda: work(2))
+
+
+def test_the_error_of_the_first_of_two_functions_is_raised(threads: int) -> None:
+    def fail(text: str) -> None:
+        raise ValueError(text)
+
+    with pytest.raises(ValueError, match="one"):
+        run_both(lambda: fail("one"), lambda: fail("two"))
+    with pytest.raises(ValueError, match="two"):
+        run_both(lambda: None, lambda: fail("two"))
+    assert map_parts(lambda part: run_both(threading.get_ident, threading.get_ident), 1, 1)

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.completion.pasting.paste_content import content_box
-from cagefield.completion.patcher import PatchStage
-from cagefield.completion.surfaces.grid_block import extract_block
+from cagefield.completion.patch_stages import PatchStage
+from cagefield.completion.surfaces.block_extraction import extract_block
 from cagefield.edits import Edit, EditStack, PreparedStack, dump_edits, parse_edits
 from cagefield.edits.operations import Rotate, Scale
 from cagefield.errors import EditError, EditFileError, SceneError

@@ -12,15 +12,17 @@ import numpy as np
 import pytest
 
 from cagefield.cameras.camera import Camera
-from cagefield.completion import patch_cache
+from cagefield.completion import patch_cache, removal_cache
 from cagefield.completion import patcher as patcher_module
 from cagefield.completion.lighting.ambient_occlusion import LightModel, occlusion_radii
-from cagefield.completion.patcher import PatchStage
+from cagefield.completion.patch_stages import PatchStage
 from cagefield.completion.surfaces import visibility
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit, EditStack, Move
+from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.images.render_result import RenderResult
 from cagefield.scene.scene import Scene
+from cagefield.server.render_worker import edited_renderers
 from cagefield.server.render_worker.cancellation import GivenUpError
 from cagefield.server.render_worker.edited_renderers import attained_refinement
 from cagefield.server.render_worker.refinement import FINAL, Refinement
@@ -107,8 +109,10 @@ def test_patches_are_cancelled_from_within_and_made_whole_later(cache: RendererC
     whole = patcher.prepare(edits)
     assert calls > 10, "work that cannot be cancelled for long"
     patcher._cache.clear()
+    patcher._removals.clear()
     patcher._light_block = None
-    patcher.__dict__.pop("_visibility", None)
+    for name in ("_visibility", "_surfels"):
+        patcher.__dict__.pop(name, None)
     with pytest.raises(GivenUpError):
         patcher.prepare(edits, proceed=cancelled_after(calls // 2))
     assert patcher.prepare(edits, stage=PatchStage.CACHED)[0].patch is None
@@ -196,6 +200,55 @@ def test_light_around_a_cage_is_known_before_it_is_dragged(
 )
 def test_refinements_that_change_nothing_are_known(edit: Edit, attained: Refinement) -> None:
     patcher = Scene(ball_field(resolution=33)).patcher
-    assert attained_refinement(Refinement.DRAFT, [edit], patcher) == attained
+    patches = patcher.attained_stage(patcher.prepare([edit], stage=PatchStage.CACHED))
+    assert attained_refinement(Refinement.DRAFT, [edit], patches, splits=False) == attained
+    # Splats are split where an edit cuts them, which is no part of a draft.
+    least = min(attained, Refinement.INPAINTED) if edit.enabled else attained
+    assert attained_refinement(Refinement.DRAFT, [edit], patches, splits=True) == least
     made = FINAL if edit.relight == "none" else Refinement.EXACT
-    assert attained_refinement(Refinement.EXACT, [edit], patcher) == (made if edit.enabled else FINAL)
+    if isinstance(edit, Move) and made < FINAL:
+        return  # without its patch, which the picture of that refinement has
+    for splits in (False, True):
+        found = attained_refinement(Refinement.EXACT, [edit], patches, splits=splits)
+        assert found == (made if edit.enabled else FINAL)
+
+
+def test_what_a_part_leaves_is_found_once_for_all_its_drags(
+    cache: RendererCache, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At rest, before the part moves; a drag shows the same as one for which nothing was known."""
+    patcher, at_rest = cache.scene.patcher, MOVED.replace(operations=())
+    whole = cache.renderer(Shown(values_of((MOVED,))), FINAL).renderer.render(CAMERA)
+    patcher._cache.clear()
+    patcher._removals.clear()
+    cache.warm_light(Shown(values_of((at_rest,))), lambda: None)
+    assert len(patcher._removals) == 1
+    for name in ("remove_part", "remove_splats"):
+        monkeypatch.setattr(removal_cache, name, lambda *args, **kwargs: pytest.fail("it is known"))
+    for edit in (MOVED.translate((0.1, 0.0, 0.0)), MOVED):
+        for stage in (PatchStage.INPAINTED, PatchStage.LIT):
+            stack = patcher.prepare([edit], stage=stage)
+            assert patcher.attained_stage(stack) is PatchStage.INPAINTED
+    np.testing.assert_array_equal(cache.plain.with_edits(stack).render(CAMERA).rgb, whole.rgb)
+
+
+@pytest.mark.parametrize("quick", [False, True])
+def test_a_drag_after_the_first_begins_with_its_infill(
+    cache: RendererCache, quick: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A draft has it, which is then no draft; the final picture comes next where light takes no longer."""
+    monkeypatch.setattr(edited_renderers, "MAX_MERGED_SECONDS", math.inf if quick else -1.0)
+    first, second = (Shown(values_of((edit,))) for edit in (MOVED, MOVED.translate((0.1, 0.0, 0.0))))
+    assert cache.renderer(first, Refinement.DRAFT).refinement is Refinement.DRAFT
+    made = cache.renderer(first, Refinement.INPAINTED)
+    is_sampled = isinstance(cache.scene.field, VoxelField)
+    inpainted = Refinement.EXACT if is_sampled else Refinement.INPAINTED
+    assert made.refinement is (FINAL if quick else inpainted)
+    cache.renderer(first, FINAL)
+    draft = cache.renderer(second, Refinement.DRAFT)
+    assert draft.refinement is inpainted
+    final = cache.renderer(second, Refinement(draft.refinement + 1))
+    assert final.refinement is (FINAL if quick or is_sampled else Refinement.EXACT)
+    exact = cache.scene.with_edits(EditStack([second.edits[0].edit()])).render(CAMERA).rgb
+    shown = cache.renderer(second, FINAL).renderer.render(CAMERA, background=cache.scene.background).rgb
+    np.testing.assert_array_equal(shown, exact)

@@ -9,7 +9,7 @@ import pytest
 
 from cagefield.cameras.camera import Camera
 from cagefield.completion.lighting.ambient_occlusion import LightModel, occlusion_radii
-from cagefield.completion.patcher import PatchStage
+from cagefield.completion.patch_stages import PatchStage
 from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
 from cagefield.geometry.cage import Cage

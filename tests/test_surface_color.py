@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
+from cagefield.completion.surfaces.block_extraction import extract_block
+from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.surface_color import (
     FULLY_DENOISED_LOG_GAIN,
     MIN_DENOISED_LOG_GAIN,

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.cameras.camera import Camera
 from cagefield.completion.lighting.ambient_occlusion import LightModel
-from cagefield.completion.surfaces.grid_block import extract_block
+from cagefield.completion.surfaces.block_extraction import extract_block
 from cagefield.completion.surfaces.plane_snapping import snap_to_planes
 from cagefield.completion.surfaces.surfels import (
     FAR_DISTANCE,

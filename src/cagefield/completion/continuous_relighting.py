@@ -24,8 +24,9 @@ from scipy import ndimage
 from cagefield.completion.inpainting.support_inpainting import inpaint_support
 from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.lighting.light_change import LightChange
+from cagefield.completion.surfaces.block_extraction import extract_block
 from cagefield.completion.surfaces.footprint import build_footprint
-from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
+from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.patch_bounds import SUPPORT_DISTANCE_VOXELS, extrude_box
 from cagefield.completion.surfaces.plane_snapping import snap_to_planes
 from cagefield.completion.surfaces.support_plane import Support, find_support

@@ -1,36 +1,33 @@
-"""Context of one discrete edit: the block around its cages, its surfels, and the change of light on them."""
+"""Context of one discrete edit: the block around V^c, its surfels, and their light without the part."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
-from cagefield.completion.inpainting.feathering import feather_rim
 from cagefield.completion.lighting.ambient_occlusion import LightModel
-from cagefield.completion.lighting.light_change import LightChange
-from cagefield.completion.surfaces.footprint import CONTACT_DISTANCE_VOXELS, Footprint
-from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
+from cagefield.completion.surfaces.block_extraction import extract_block, extract_vertices
+from cagefield.completion.surfaces.block_union import part_slices
+from cagefield.completion.surfaces.footprint import CONTACT_DISTANCE_VOXELS
+from cagefield.completion.surfaces.grid_block import GridBlock
+from cagefield.completion.surfaces.near_masks import distances_near
 from cagefield.completion.surfaces.patch_bounds import SUPPORT_DISTANCE_VOXELS, patch_box
 from cagefield.completion.surfaces.plane_snapping import snap_to_planes
 from cagefield.completion.surfaces.support_plane import Support, find_support
 from cagefield.completion.surfaces.surfels import (
     Surfels,
-    concatenate_surfels,
-    extract_cut_faces,
     extract_surfels,
     prefer_visible,
 )
 from cagefield.completion.surfaces.visibility import CameraVisibility
-from cagefield.edits import Delete, Discrete, EditMap, Paste, PreparedEdit, PreparedStack
+from cagefield.edits import Discrete, EditMap, Paste, PreparedEdit, PreparedStack
 from cagefield.edits.patch import Pasted
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Mask
-from cagefield.warps.hexahedron_map import HexahedronMap
 
 LIGHT_SPACING_VOXELS = 2.0
 """Maximum distance of the surfels on which light is computed, voxels."""
@@ -40,6 +37,9 @@ LIGHT_SPACING_SHARE = 1.0 / 16.0
 
 PROBE_DEPTH_VOXELS = 0.75
 """Depth beneath a surfel at which its membership in the part is tested, voxels."""
+
+MAX_SURFEL_VERTICES = 1 << 23
+"""Maximum number of vertices of a grid all of whose surfels are found at once, 203 along each axis."""
 
 MIN_LOG_CHANGE = 0.01
 """Minimum change of light (log); smaller ones are dropped."""
@@ -56,9 +56,9 @@ class EditContext:
         emptied: the block with V^c emptied.
         inside: [X,Y,Z], mask of V^c.
         part: [X,Y,Z], mask of the solid vertices in V^c.
-        include_destination: whether the part is shown at its new place, and casts its shadow there.
         visibility: the field's visible surfaces; None if unknown, or if edits below move the field.
         light_spacing: distance of the surfels on which light is computed, world units.
+        surfels: `extract_field_surfels` of the field; None if unknown, or if edits below move the field.
         pasted: all surfels with a paste; None of another edit.
     """
 
@@ -68,9 +68,9 @@ class EditContext:
     emptied: GridBlock
     inside: Mask
     part: Mask
-    include_destination: bool
     visibility: CameraVisibility | None
     light_spacing: float
+    surfels: Surfels | None = None
     pasted: Surfels | None = None
 
     @classmethod
@@ -80,31 +80,27 @@ class EditContext:
         below: EditMap,
         edit: Discrete,
         model: LightModel | None,
-        include_destination: bool,
-        preserve_opacity: bool,
-        after: VoxelField | None,
-        visibility: CameraVisibility | None,
+        visibility: CameraVisibility | None = None,
+        *,
+        preserve_opacity: bool = True,
+        surfels: Surfels | None = None,
+        after: VoxelField | None = None,
         pasted: Pasted | None = None,
     ) -> EditContext:
-        """Context of an edit of a field under the edits below.
+        """Context of an edit of a field under the edits below, the same wherever the part is put down.
 
         model: the light model, None to leave light as it is; after: the field with a paste, or None to
         compose it from `pasted`, the content of the paste.
         """
         # The field's visible surfaces are not where the edits below have moved them.
-        visibility = None if below.steps else visibility
-        include_destination = include_destination and not isinstance(edit, Delete)
+        visibility, surfels = (None, None) if below.steps else (visibility, surfels)
         voxel = float(field.voxel_size.max())
         active_model = model if model is not None and model.has_effect else LightModel((), ())
         light_spacing = min(
             LIGHT_SPACING_VOXELS * voxel, LIGHT_SPACING_SHARE * active_model.max_radius or np.inf
         )
         box = patch_box(
-            edit,
-            voxel,
-            active_model.max_radius,
-            include_destination=include_destination,
-            shadow_directions=active_model.shadow_directions,
+            edit, voxel, active_model.max_radius, shadow_directions=active_model.shadow_directions
         )
         before = extract_block(field, below, box, preserve_opacity=preserve_opacity)
         region = Cage.box(box.mean(axis=0), box[1] - box[0] - 2.0 * voxel)
@@ -119,12 +115,12 @@ class EditContext:
                 before,
                 none,
                 none,
-                include_destination,
                 visibility,
                 light_spacing,
+                surfels,
                 extract_surfels(block),
             )
-        inside = edit.inner.contains(before.positions(np.ones(before.shape, bool))).reshape(before.shape)
+        inside = _vertices_inside(before, edit.inner)
         emptied = before
         if edit.uncovers:
             # Keep negative densities: the trilinear zero crossing places the surface at sub-voxel precision.
@@ -136,9 +132,9 @@ class EditContext:
             emptied,
             inside,
             before.solid & inside,
-            include_destination,
             visibility,
             light_spacing,
+            surfels,
         )
 
     @cached_property
@@ -151,29 +147,18 @@ class EditContext:
         """Block coordinates [N,3] of the surfels in `remaining`."""
         return self.before.block_coordinates(self.remaining.points)
 
-    def _distance_from(self, mask: Mask, spacing: float = 1.0) -> Array:
-        """Distances [N] of the surfels in `remaining` from the vertices of a mask [X,Y,Z]."""
-        if not mask.any():
-            return np.full(len(self.remaining_coordinates), np.inf)
-        distance = ndimage.distance_transform_edt(~mask, sampling=spacing)
-        return np.asarray(
-            ndimage.map_coordinates(distance, self.remaining_coordinates.T, order=1, mode="nearest")
-        )
-
     @cached_property
     def near_part(self) -> NDArray[np.bool_]:
         """Mask [N] of the surfels in `remaining` around V^c."""
         size = float(np.median(self.edit.inner.aabb[1] - self.edit.inner.aabb[0]))
-        return np.asarray(
-            self._distance_from(self.inside) < max(SUPPORT_DISTANCE_VOXELS, 0.5 * size / self.voxel)
-        )
+        reach = max(SUPPORT_DISTANCE_VOXELS, 0.5 * size / self.voxel)
+        return distances_near(self.inside, self.remaining_coordinates, reach) < reach
 
     @property
     def contact(self) -> Array:
         """Block coordinates [N,3] of the surfels in `remaining` that the part hides by contact."""
-        return self.remaining_coordinates[
-            self.near_part & (self._distance_from(self.part) < CONTACT_DISTANCE_VOXELS)
-        ]
+        near = self.remaining_coordinates[self.near_part]
+        return near[distances_near(self.part, near, CONTACT_DISTANCE_VOXELS) < CONTACT_DISTANCE_VOXELS]
 
     def find_support(self) -> Support | None:
         """Support plane that the part stood on; None without one."""
@@ -184,13 +169,16 @@ class EditContext:
         """Longest edge of a voxel, world units."""
         return max(self.before.spacing)
 
+    def surfels_of(self, block: GridBlock) -> Surfels:
+        """Surfels of a block of the field, a voxel apart: visible ones where cameras see the surface."""
+        if self.surfels is not None:
+            return self.surfels.crop_to_block(block)
+        return _extract_visible(block, self.visibility)
+
     @cached_property
     def _surfels(self) -> tuple[Surfels, NDArray[np.bool_]]:
         """(surfels before the edit, mask [N] of those of the part)."""
-        surface = extract_surfels(self.before)
-        if self.visibility is not None:
-            surface = prefer_visible(surface, self.visibility.surface.crop_to_block(self.before), self.voxel)
-        surface = surface.downsample(self.voxel)
+        surface = self.surfels_of(self.before)
         probes = surface.points - PROBE_DEPTH_VOXELS * self.voxel * surface.normals
         return surface, np.asarray(self.edit.inner.contains(probes) & (not isinstance(self.edit, Paste)))
 
@@ -224,70 +212,44 @@ class EditContext:
         """
         if not self.edit.uncovers or not len(self.removed.points):
             return np.zeros(len(self.light_surfels.points))
-        return -_log_light_change(model, self.light_surfels, self.remaining, self.removed, self.voxel)
-
-    def light_change_at_destination(
-        self, under: GridBlock, footprint: Footprint | None, model: LightModel, strength: float
-    ) -> tuple[LightChange, LightChange | None]:
-        """(change of light on a block, on the part or None) with the part at its destination.
-
-        under: the block without the part; footprint: its inpainted columns; strength: of the part's shade
-        on it. A paste keeps its own light.
-        """
-        remaining = self.remaining
-        if footprint is not None:
-            points = footprint.points(under)
-            inpainted = Surfels(points, np.broadcast_to(footprint.support.normal, points.shape))
-            remaining = concatenate_surfels(
-                [remaining.take(~footprint.contains(self.remaining_coordinates)), inpainted]
-            )
-        light_surfels = remaining.downsample(self.light_spacing)
-        if self.pasted is not None:
-            added = self.pasted.take(remaining.distance(self.pasted.points) > 0.5 * self.voxel)
-            log = _log_light_change(model, light_surfels, remaining, added, self.voxel)
-            return LightChange.from_surfels(under, light_surfels, log, self.light_spacing), None
-        part, moved = self._move(self.removed)
-        # With its cut faces: the part is solid at its destination, not a shell.
-        moved_solid = concatenate_surfels(
-            [moved, self._move(extract_cut_faces(self.before, self.edit.inner))[1]]
-        )
-        log = strength * _log_light_change(model, light_surfels, remaining, moved_solid, self.voxel)
-        change = LightChange.from_surfels(under, light_surfels, log, self.light_spacing)
-        before = [self.surroundings, self.removed]
-        log = model.log_light([remaining, moved_solid], moved) - model.log_light(before, part)
-        log = np.where(np.abs(log) < MIN_LOG_CHANGE, 0.0, log)
-        on_part = LightChange.from_surfels(self.before, part, log, self.light_spacing)
-        mask = on_part.mask & self.inside
-        return change, LightChange(mask, on_part.log_ratio[self.inside[on_part.mask]])
-
-    @property
-    def _onto_deformed(self) -> HexahedronMap:
-        """Map of V^c onto V."""
-        return self.edit.map_between(self.edit.inner, self.edit.deformed).inverse
-
-    def _move(self, surface: Surfels) -> tuple[Surfels, Surfels]:
-        """(surfels inside V^c, the same surfels at the destination)."""
-        inside, points, jacobian = self._onto_deformed(surface.points)
-        part = surface.take(inside)
-        return part, part.transform(points, jacobian)
-
-    def extract_part(self, block: GridBlock, destination: GridBlock) -> GridBlock | None:
-        """Block of the part as shown at its destination; None if it is unchanged.
-
-        The part is feathered into `destination`. Vertices away from the part have no color.
-        """
-        feather = self.edit.feather if self.include_destination and not isinstance(self.edit, Paste) else 0.0
-        if block is self.before and feather == 0.0:
-            return None
-        if feather > 0.0:
-            block = feather_rim(block, destination, self._onto_deformed, self.inside, feather)
-        is_near = ndimage.binary_dilation(self.inside, iterations=2)
-        vertices = np.argwhere(is_near)
-        part = replace(block, slot=np.where(is_near, block.slot, -1))
-        return part.crop(vertices.min(axis=0), vertices.max(axis=0)) if len(vertices) else part
+        return -log_light_change(model, self.light_surfels, self.remaining, self.removed, self.voxel)
 
 
-def _log_light_change(
+def extract_field_surfels(field: VoxelField, visibility: CameraVisibility) -> Surfels | None:
+    """Surfels of a whole field, of which each edit takes those around it; None of a field too large."""
+    shape = np.array(field.resolution)
+    if shape.prod() > MAX_SURFEL_VERTICES:
+        return None
+    return _extract_visible(
+        extract_vertices(field, PreparedStack(), np.zeros(3, np.int64), shape), visibility
+    )
+
+
+def _extract_visible(block: GridBlock, visibility: CameraVisibility | None) -> Surfels:
+    """Surfels of a block, a voxel apart."""
+    surface, voxel = extract_surfels(block), max(block.spacing)
+    if visibility is not None:
+        surface = prefer_visible(surface, visibility.surface.crop_to_block(block), voxel)
+    return surface.downsample(voxel)
+
+
+def _vertices_inside(block: GridBlock, cage: Cage) -> Mask:
+    """Mask [X,Y,Z] of the vertices of a block inside a cage."""
+    if block.field.contracted:  # where boxes have curved sides
+        return cage.contains(block.positions(np.ones(block.shape, bool))).reshape(block.shape)
+    low, high = cage.aabb
+    corners = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(-1, 3)
+    g = block.block_coordinates(corners)
+    first = np.clip(np.floor(g.min(axis=0)).astype(np.int64), 0, None)
+    crop = block.crop(first, np.ceil(g.max(axis=0)).astype(np.int64))
+    mask = np.zeros(block.shape, bool)
+    if crop.density.size:
+        found = cage.contains(crop.positions(np.ones(crop.shape, bool)))
+        mask[part_slices(block, crop)] = found.reshape(crop.shape)
+    return mask
+
+
+def log_light_change(
     model: LightModel, surfels: Surfels, around: Surfels, added: Surfels, voxel: float
 ) -> Array:
     """Log ratio of the light [N] on surfels among `around` and `added` to that among `around` alone.

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from enum import IntEnum
 from functools import cached_property
-from typing import cast
+from typing import Any, cast
 
 from cagefield.cameras.camera import Camera
 from cagefield.completion.continuous_relighting import (
@@ -18,6 +18,7 @@ from cagefield.completion.continuous_relighting import (
 )
 from cagefield.completion.detour_cache import DetourCache
 from cagefield.completion.discrete_patch import build_patch
+from cagefield.completion.edit_context import extract_field_surfels
 from cagefield.completion.lighting.ambient_occlusion import (
     LightModel,
     fit_light_model,
@@ -27,8 +28,12 @@ from cagefield.completion.lighting.ambient_occlusion import (
 from cagefield.completion.pasting.paste_composite import composite_paste
 from cagefield.completion.pasting.paste_loader import PasteLoader
 from cagefield.completion.patch_cache import DiskCache
+from cagefield.completion.patch_stages import PatchStage, needs_patch, needs_relighting
+from cagefield.completion.removal import Removal
+from cagefield.completion.removal_cache import RemovalCache
 from cagefield.completion.splat_patch import (
     SplatBlock,
+    SplatRemoval,
     build_splat_patch,
     extract_splat_block,
     relight_splats,
@@ -37,7 +42,7 @@ from cagefield.completion.surfaces.splat_voxelization import voxelize_bounds
 from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.completion.surfaces.visibility import CameraVisibility, render_visibility
 from cagefield.compute.cancellation import cancellable, check_cancelled
-from cagefield.edits import Continuous, Delete, Discrete, Edit, Paste, PreparedEdit, PreparedStack
+from cagefield.edits import Continuous, Discrete, Edit, Paste, PreparedEdit, PreparedStack
 from cagefield.edits.options import CastShadow
 from cagefield.edits.patch import Pasted, Patch, SplatPatch
 from cagefield.fields.splat_field import SplatField
@@ -49,19 +54,6 @@ MAX_CACHED_PATCHES = 16
 """Maximum number of patches in memory."""
 
 Key = tuple[object, ...]
-
-
-class PatchStage(IntEnum):
-    """Stages of the patches of a stack, each with all of those before.
-
-    CACHED: patches in the cache alone, none is computed. INPAINTED: holes are inpainted, without the light at
-    the destination of a discrete edit and that of a continuous one, so that no patch depends on where an
-    edit takes its content. LIT: light, feathered seams.
-    """
-
-    CACHED = 0
-    INPAINTED = 1
-    LIT = 2
 
 
 class Patcher:
@@ -84,6 +76,7 @@ class Patcher:
         self._disk_cache = DiskCache(self._field, cameras)
         self._cache: OrderedDict[Key, Patch | SplatPatch | PreparedEdit | None] = OrderedDict()
         self._light_block: tuple[Key, VoxelBlock | SplatBlock] | None = None
+        self._removals = RemovalCache(self._content, lambda: self._surfels)
         self._directional_models: dict[tuple[float, float, float] | None, LightModel] = {}
         self._composites: OrderedDict[Key, Pasted] = OrderedDict()
         self.detours = DetourCache(self._field)
@@ -148,19 +141,35 @@ class Patcher:
             return replace(step, light=self._build_light(below, edit, stage))
         return step
 
-    def attained_stage(self, edits: Sequence[Edit]) -> PatchStage:
-        """Last stage whose patches are those of stage CACHED, whatever the cache holds: LIT without any."""
+    def attained_stage(self, prepared: PreparedStack, *, preserve_opacity: bool = True) -> PatchStage:
+        """Last stage whose patches the stack of `prepare` has for certain: LIT where it needs none.
+
+        A patch that is there counts as INPAINTED, also where it is that of stage LIT.
+        """
         is_voxels = isinstance(self._field, VoxelField)
         known_dark = "light_model" in self.__dict__ and not self.light_model.has_effect
         attained = PatchStage.LIT
-        for edit in edits:
+        for number, step in enumerate(prepared):
+            edit, below = step.edit, PreparedStack(prepared.edits[:number])
             if isinstance(edit, Paste) and is_voxels and edit.enabled:
                 attained = min(attained, PatchStage.INPAINTED)  # composited with the field beneath
-            if needs_patch(edit, feathers=is_voxels):
-                return PatchStage.CACHED
-            if needs_relighting(edit) and not (known_dark and edit.relight == "occlusion"):
+            if isinstance(edit, Discrete) and needs_patch(edit, feathers=is_voxels):
+                has_patch = self._has_patch(below, step, preserve_opacity)
+                attained = min(attained, PatchStage.INPAINTED if has_patch else PatchStage.CACHED)
+            is_dark = known_dark and edit.relight == "occlusion"
+            if needs_relighting(edit) and not is_dark:
                 attained = min(attained, PatchStage.INPAINTED)
         return attained
+
+    def _has_patch(self, below: PreparedStack, step: PreparedEdit, preserve_opacity: bool) -> bool:
+        """Whether a discrete edit, above those below, has its patch of stage INPAINTED or of LIT."""
+        edit = step.edit
+        assert isinstance(edit, Discrete)
+        if step.patch is None or not self._is_model_known(edit):
+            return False
+        has_light = (model := self._model_for(edit)) is not None and model.has_effect
+        keys = self._patch_keys(below, edit, step.pasted, has_light, preserve_opacity)[:2]
+        return any(self._cache.get(key) is step.patch for key in keys)
 
     def warm(
         self,
@@ -171,17 +180,24 @@ class Patcher:
     ) -> None:
         """Compute all that does not depend on where the next drag goes; `proceed` cancels.
 
-        These are the visibility and the light model of the field and, where the last of the edits is a
-        continuous one that relights, the block around its outer cage.
+        These are the visibility, the light model and the surfels of the field, and of the last of the edits,
+        if it is a continuous one that relights, the block around its outer cage, if it is a discrete one,
+        the removal of its part.
         """
         with cancellable(proceed):
-            _ = self.light_model
+            _ = self.light_model, self._surfels
             last = edits[-1] if edits else None
-            if isinstance(last, Continuous) and last.relight != "none":
-                below = self.prepare(edits[:-1], preserve_opacity=preserve_opacity, proceed=proceed)
-                model = self._model_for(last)
-                if model is not None and model.has_effect:
+            if not isinstance(last, Continuous | Discrete) or isinstance(last, Paste):
+                return
+            below = self.prepare(edits[:-1], preserve_opacity=preserve_opacity, proceed=proceed)
+            has_light = (model := self._model_for(last)) is not None and model.has_effect
+            if isinstance(last, Continuous):
+                if has_light:
+                    assert model is not None
                     self._block_around(below, last, model)
+            elif has_light or (last.fill != "none" and last.uncovers):
+                used, visibility = self._inputs(last, model, is_lit=True)
+                self._removals.get_or_make(below, last, used, visibility, preserve_opacity)
 
     def _composite(
         self, below: PreparedStack, edit: Paste, pasted: Pasted, stage: PatchStage, preserve_opacity: bool
@@ -247,6 +263,14 @@ class Patcher:
         self._images.clear()
         return visibility
 
+    @cached_property
+    def _surfels(self) -> Surfels | None:
+        """Surfels of the whole field for discrete edits; None of splats, and of a field too large."""
+        if not isinstance(field := self._content, VoxelField):
+            return None
+        make = functools.partial(extract_field_surfels, field, self._visibility)
+        return self._disk_cache.get_or_make(("surfels",), make)
+
     @property
     def visible_surfels(self) -> Surfels:
         """Surfels of the field's surfaces that its cameras see, canonical space."""
@@ -273,13 +297,7 @@ class Patcher:
         has_light = model_or_none is not None and model_or_none.has_effect
         if isinstance(edit, Paste) and not has_light:
             return None
-        feather = edit.feather if is_voxels else 0.0
-        kind = type(edit), edit.fill, feather, pasted, preserve_opacity
-        base_key: Key = (*below.steps, edit.inner, *kind, has_light and edit.relight)
-        shown = (edit.deformed, edit.mirrored) if has_light or feather > 0.0 else None
-        final_key: Key = (*base_key, shown)
-        moving_key: Key = (*base_key, "moving")
-        unlit_key: Key = (*below.steps, edit.inner, *kind, False, "moving")
+        final_key, moving_key, unlit_key = self._patch_keys(below, edit, pasted, has_light, preserve_opacity)
         for key in (final_key,) if is_lit else (final_key, moving_key):
             if key in self._cache:
                 self._cache.move_to_end(key)
@@ -288,38 +306,49 @@ class Patcher:
             return cast("Patch | SplatPatch | None", self._cache.get(unlit_key))
         if not needs_patch(edit, not is_lit, feathers=is_voxels):
             return None
-        model = model_or_none if has_light else None
-        needs_visibility = has_light or (edit.fill == "surroundings" and edit.uncovers)
-        visibility = (
-            self._visibility if needs_visibility and (is_lit or "_visibility" in self.__dict__) else None
-        )
+        model, visibility = self._inputs(edit, model_or_none, is_lit)
 
         def make() -> Patch | SplatPatch:
+            removal: Removal | SplatRemoval | None = None
+            if not isinstance(edit, Paste):
+                removal = self._removals.get_or_make(below, edit, model, visibility, preserve_opacity)
+            common: dict[str, Any] = {"include_destination": is_lit, "removal": removal}
+            common |= {"visibility": visibility, "pasted": pasted}
             if isinstance(self._content, VoxelField):
-                return build_patch(
-                    self._content,
-                    below,
-                    edit,
-                    model,
-                    include_destination=is_lit,
-                    visibility=visibility,
-                    preserve_opacity=preserve_opacity,
-                    pasted=pasted,
-                )
-            return build_splat_patch(
-                self._content,
-                below,
-                edit,
-                model,
-                include_destination=is_lit,
-                visibility=visibility,
-                pasted=pasted,
-            )
+                common |= {"preserve_opacity": preserve_opacity}
+                return build_patch(self._content, below, edit, model, **common)
+            return build_splat_patch(self._content, below, edit, model, **common)
 
         inputs = ("patch", model, *below.steps, edit.ungraded, preserve_opacity)
         patch = self._disk_cache.get_or_make(inputs, make) if is_lit else make()
         self._store(final_key if is_lit else moving_key, patch)
         return patch
+
+    def _inputs(
+        self, edit: Discrete, model: LightModel | None, is_lit: bool
+    ) -> tuple[LightModel | None, CameraVisibility | None]:
+        """(light model, visibility) for the patch of an edit, as far as it needs them and they are known."""
+        used = model if model is not None and model.has_effect else None
+        needs_visibility = used is not None or (edit.fill == "surroundings" and edit.uncovers)
+        if not needs_visibility or not (is_lit or "_visibility" in self.__dict__):
+            return used, None
+        return used, self._visibility
+
+    def _patch_keys(
+        self,
+        below: PreparedStack,
+        edit: Discrete,
+        pasted: Pasted | None,
+        has_light: bool,
+        preserve_opacity: bool,
+    ) -> tuple[Key, Key, Key]:
+        """Keys of the patch of stage LIT, of that of INPAINTED, and of the latter without light."""
+        feather = edit.feather if isinstance(self._field, VoxelField) else 0.0
+        kind = type(edit), edit.fill, feather, pasted, preserve_opacity
+        base_key: Key = (*below.steps, edit.inner, *kind, has_light and edit.relight)
+        shown = (edit.deformed, edit.mirrored) if has_light or feather > 0.0 else None
+        unlit_key: Key = (*below.steps, edit.inner, *kind, False, "moving")
+        return (*base_key, shown), (*base_key, "moving"), unlit_key
 
     def _build_light(self, below: PreparedStack, edit: Continuous, stage: PatchStage) -> PreparedEdit | None:
         """Edit that changes the light under a continuous one; None if no light changes, or none is known."""
@@ -369,27 +398,3 @@ class Patcher:
         self._cache[key] = value
         while len(self._cache) > MAX_CACHED_PATCHES:
             self._cache.popitem(last=False)
-
-
-def needs_patch(edit: Edit, moving: bool = False, *, feathers: bool = True) -> bool:
-    """Whether an enabled discrete edit leaves something to inpaint, to relight or to feather.
-
-    `feathers`: whether the field's kind has seams to feather; splats have none.
-    """
-    if not isinstance(edit, Discrete) or not (edit.enabled and edit.changes_geometry):
-        return False
-    seam = feathers and edit.feather > 0.0
-    if not edit.uncovers:
-        return not moving and (edit.relight != "none" or seam)
-    return edit.fill != "none" or edit.relight != "none" or (seam and not isinstance(edit, Delete))
-
-
-def needs_relighting(edit: Edit) -> bool:
-    """Whether an edit is an enabled, possible continuous one that relights."""
-    return (
-        isinstance(edit, Continuous)
-        and edit.enabled
-        and edit.changes_geometry
-        and edit.relight != "none"
-        and edit.is_possible
-    )

@@ -21,13 +21,20 @@ from cagefield.completion.continuous_relighting import (
     light_box,
     light_edit,
 )
-from cagefield.completion.discrete_patch import compute_patch
-from cagefield.completion.inpainting.splat_inpainting import NO_SPLATS, KnownSplats
+from cagefield.completion.destination import Destination, place_part
+from cagefield.completion.inpainting.splat_inpainting import NO_SPLATS, KnownSplats, NewSplats
 from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.lighting.light_change import LightChange
-from cagefield.completion.surfaces.grid_block import GridBlock, extract_block
+from cagefield.completion.removal import Removal, remove_part
+from cagefield.completion.surfaces.block_extraction import extract_block, extract_vertices
+from cagefield.completion.surfaces.block_union import VertexRange, embed_mask
+from cagefield.completion.surfaces.grid_block import GridBlock, world_positions
 from cagefield.completion.surfaces.patch_bounds import patch_box
-from cagefield.completion.surfaces.splat_voxelization import choose_voxel_size, voxelize_splats
+from cagefield.completion.surfaces.splat_voxelization import (
+    choose_voxel_size,
+    voxelize_splats,
+    voxelize_vertices,
+)
 from cagefield.completion.surfaces.visibility import CameraVisibility
 from cagefield.compute.cancellation import check_cancelled
 from cagefield.edits import Continuous, Delete, Discrete, Edit, EditMap, EditStack, Paste, PreparedEdit
@@ -44,6 +51,72 @@ MIN_FILL_DIFFERENCE = 0.2
 """Minimum change of spherical-harmonics coefficients, at unchanged density, for which splats are replaced."""
 
 
+@dataclass(frozen=True, eq=False)
+class SplatRemoval:
+    """Removal of the part of a discrete edit of splats, the same wherever the part is put down.
+
+    Attributes:
+        removal: on a grid of the splats around V^c.
+        scene: the field that patches name their sources in.
+        field: all splats with the pastes beneath; moved: those that the edits below move.
+        known: the splats around V^c with their colors, of which new ones are copies.
+        is_new: [X,Y,Z], vertices of the removal's block whose splats are replaced.
+        new: the new splats.
+    """
+
+    removal: Removal
+    scene: SplatField
+    field: SplatField
+    moved: MovedSplats
+    known: KnownSplats
+    is_new: Mask
+    new: NewSplats
+
+
+def remove_splats(
+    splats: SplatField | SplatSet,
+    below: EditMap,
+    edit: Discrete,
+    model: LightModel | None,
+    *,
+    visibility: CameraVisibility | None = None,
+    pasted: Pasted | None = None,
+) -> SplatRemoval:
+    """Removal of the part of a discrete edit of splats; arguments as in `remove_part`."""
+    # No feathering: splats overlap, and their seams are soft.
+    edit = edit.replace(feather=0.0)
+    stack = below.followed_by(PreparedEdit(edit, pasted=pasted))
+    splats = SplatSet.from_field(splats).with_pastes(stack)
+    field = splats.field
+    active_model = model if model is not None and model.has_effect else LightModel((), ())
+
+    def patch_box_with(voxel: float) -> Array:
+        return patch_box(
+            edit, voxel, active_model.max_radius, shadow_directions=active_model.shadow_directions
+        )
+
+    all_moved = moved_splats(splats, below)
+    moved = _crop_splats(field, all_moved, _include_clone_source(edit, patch_box_with(0.0)))
+    placed = where_they_are(field, moved)
+    voxel = choose_voxel_size(placed, patch_box_with(0.0))
+    box = patch_box_with(voxel) + 3.0 * voxel * np.array([[-1.0], [1.0]])
+    grid = voxelize_splats(placed, _include_clone_source(edit, box), voxel)
+    after = None
+    if isinstance(edit, Paste):
+        shown = _crop_splats(field, moved_splats(splats, stack), box)
+        after = voxelize_splats(where_they_are(field, shown), _include_clone_source(edit, box), voxel)
+    removal = remove_part(
+        grid, EditStack(), edit, model, visibility=None if below.steps else visibility, after=after
+    )
+    known, new = KnownSplats.from_moved(field, placed, grid, moved), NO_SPLATS
+    is_new = removal.under.changed_from(removal.emptied, MIN_FILL_DIFFERENCE)
+    if isinstance(edit.fill, Clone) and edit.uncovers:
+        new = known.clone_cage(removal.under, edit.inner, edit.fill.source)
+    elif removal.support is not None:
+        new = known.fill_surface(removal.under, is_new, removal.context.region, edit.inner, removal.support)
+    return SplatRemoval(removal, splats.scene, field, all_moved, known, is_new & ~removal.inside, new)
+
+
 def build_splat_patch(
     splats: SplatField | SplatSet,
     below: EditMap,
@@ -53,64 +126,41 @@ def build_splat_patch(
     include_destination: bool = True,
     visibility: CameraVisibility | None = None,
     pasted: Pasted | None = None,
+    removal: SplatRemoval | None = None,
 ) -> SplatPatch:
-    """Patch of a discrete edit of splats under the edits below; arguments as in `compute_patch`."""
-    # No feathering: splats overlap, and their seams are soft.
-    edit = edit.replace(feather=0.0)
-    stack = below.followed_by(PreparedEdit(edit, pasted=pasted))
-    splats = SplatSet.from_field(splats).with_pastes(stack)
-    field = splats.field
-    active_model = model if model is not None and model.has_effect else LightModel((), ())
-    to_destination = include_destination and not isinstance(edit, Delete)
-    moved = _crop_splats(
-        field,
-        moved_splats(splats, below),
-        _include_clone_source(
-            edit,
-            patch_box(edit, 0.0, active_model.max_radius, shadow_directions=active_model.shadow_directions),
-        ),
-    )
-    placed = where_they_are(field, moved)
-    voxel = choose_voxel_size(
-        placed,
-        patch_box(
-            edit,
-            0.0,
-            active_model.max_radius,
-            include_destination=to_destination,
-            shadow_directions=active_model.shadow_directions,
-        ),
-    )
-    box = patch_box(
-        edit,
-        voxel,
-        active_model.max_radius,
-        include_destination=to_destination,
-        shadow_directions=active_model.shadow_directions,
-    ) + 3.0 * voxel * np.array([[-1.0], [1.0]])
-    grid = voxelize_splats(placed, _include_clone_source(edit, box), voxel)
-    after = None
-    if isinstance(edit, Paste):
-        shown = _crop_splats(field, moved_splats(splats, stack), box)
-        after = voxelize_splats(where_they_are(field, shown), _include_clone_source(edit, box), voxel)
-    result = compute_patch(
-        grid,
-        EditStack(),
-        edit,
-        model,
-        include_destination=include_destination,
-        visibility=None if below.steps else visibility,
-        after=after,
-    )
-    known, new = KnownSplats.from_moved(field, placed, grid, moved), NO_SPLATS
-    is_new = result.under.changed_from(result.emptied, MIN_FILL_DIFFERENCE)
-    if isinstance(edit.fill, Clone) and edit.uncovers:
-        new = known.clone_cage(result.under, edit.inner, edit.fill.source)
-    elif result.support is not None:
-        new = known.fill_surface(result.under, is_new, result.context.region, edit.inner, result.support)
-    part = None if result.part_light is None else _to_new_light(result.before, result.part_light)
-    light = _to_new_light(result.under, result.light)
-    return known.build_patch(splats.scene, result.context.region, is_new & ~result.inside, light, part, new)
+    """Patch of a discrete edit of splats under the edits below; arguments as in `build_patch`.
+
+    `removal` is its `remove_splats`, if that is known.
+    """
+    removed = removal or remove_splats(splats, below, edit, model, visibility=visibility, pasted=pasted)
+    of_block = removed.removal
+    placed = Destination.of_removal(of_block)
+    if include_destination and not isinstance(edit, Delete):
+        placed = place_part(of_block, edit.replace(feather=0.0), SplatVertices(removed))
+    part = None if placed.part_light is None else _to_new_light(of_block.part_block, placed.part_light)
+    is_new = embed_mask(placed.before, of_block.before, removed.is_new)
+    light = _to_new_light(placed.under, placed.light)
+    return removed.known.build_patch(removed.scene, placed.region, is_new, light, part, removed.new)
+
+
+@dataclass(frozen=True, eq=False)
+class SplatVertices:
+    """Vertices of the grid of a removal, which goes on beyond the splats around V^c."""
+
+    removed: SplatRemoval
+
+    def vertices(self, box: Array) -> VertexRange:
+        g = self.removed.removal.before.field.grid_coordinates(box)
+        return VertexRange(np.floor(g[0]).astype(np.int64), np.ceil(g[1]).astype(np.int64))
+
+    def extract(self, low: NDArray[np.int64], shape: NDArray[np.int64]) -> GridBlock:
+        block, removed = self.removed.removal.before, self.removed
+        ends = world_positions(block.field, np.stack([low, low + shape - 1]))
+        moved = _crop_splats(removed.field, removed.moved, ends)
+        placed = where_they_are(removed.field, moved)
+        added = voxelize_vertices(placed, ends[0], float(block.field.voxel_size.max()), shape)
+        dense = extract_vertices(added, EditStack(), np.zeros(3, np.int64), shape)
+        return replace(block, low=low, density=dense.density, slot=dense.slot, sh=dense.sh)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from cagefield.compute import devices
 from cagefield.compute.cancellation import check_cancelled
 
 Result = TypeVar("Result")
+Other = TypeVar("Other")
 
 _is_part: ContextVar[bool] = ContextVar("is_part", default=False)
 """Whether the caller is a part itself: all threads have work already."""
@@ -40,3 +41,15 @@ def map_parts(function: Callable[[slice], Result], rows: int, part: int) -> list
         return results
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def run_both(first: Callable[[], Result], second: Callable[[], Other]) -> tuple[Result, Other]:
+    """Results of two functions, the second one in a thread of its own where there is more than one thread.
+
+    Both are in the caller's scope of cancellation. Raises the error of the first one, else of the second.
+    """
+    if devices.threads() < 2 or _is_part.get():
+        return first(), second()
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(copy_context().run, second)
+        return first(), waiting.result()

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.cameras.keyframes import Keyframe, Timeline
-from cagefield.completion.patcher import Patcher, PatchStage
+from cagefield.completion.patch_stages import PatchStage
+from cagefield.completion.patcher import Patcher
 from cagefield.edits import Continuous, Delete, EditStack, PreparedEdit, PreparedStack
 from cagefield.edits.chains import application_order
 from cagefield.edits.mirror import mirrored_axes

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.cameras.keyframes import Keyframe, Timeline
-from cagefield.completion.patcher import Patcher, PatchStage
+from cagefield.completion.patch_stages import PatchStage
+from cagefield.completion.patcher import Patcher
 from cagefield.edits import EditStack, PreparedStack
 from cagefield.fields.splat_field import SplatField
 from cagefield.pages.page_splat_path import SPLAT_BYTES, SplatPathState, encode_page_splat_path

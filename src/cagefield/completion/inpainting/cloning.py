@@ -13,7 +13,8 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from cagefield.completion.surfaces.grid_block import GridBlock, sample_edited_field
+from cagefield.completion.surfaces.block_extraction import sample_edited_field
+from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.edits import EditMap
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Mask

@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 from scipy import ndimage
 
-from cagefield.completion.surfaces.grid_block import GridBlock, interpolate_field
+from cagefield.completion.surfaces.block_extraction import interpolate_field
+from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.fields.sh_rotation import rotate_sh_each
 from cagefield.typing import Mask
 from cagefield.warps.hexahedron_map import HexahedronMap

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from cagefield.completion.surfaces.block_extraction import interpolate_field
 from cagefield.completion.surfaces.footprint import MAX_SPLINE_KNOTS
-from cagefield.completion.surfaces.grid_block import GridBlock, interpolate_field, world_positions
+from cagefield.completion.surfaces.grid_block import GridBlock, world_positions
 from cagefield.completion.surfaces.support_plane import Support
 from cagefield.compute.cancellation import check_cancelled
 from cagefield.edits.patch import NewLight, SplatPatch

@@ -18,6 +18,7 @@ from cagefield.completion.inpainting.coherence_transport import estimate_orienta
 from cagefield.completion.inpainting.exemplar_inpainting import inpaint_texture
 from cagefield.completion.surfaces.footprint import MAX_SUPPORT_HEIGHT_VOXELS, Footprint
 from cagefield.completion.surfaces.grid_block import GridBlock
+from cagefield.completion.surfaces.near_masks import dilate, distances_near
 from cagefield.compute.cancellation import check_cancelled
 from cagefield.fields.sh import sh_basis
 from cagefield.typing import AnyArray, Array, Float32, Mask
@@ -49,6 +50,9 @@ MAX_BOUNDARY_BLEND = 0.1
 MIN_FOG_HEIGHT_VOXELS = 1.0
 """Minimum height of fog over a support, voxels."""
 
+FOG_RANGE_VOXELS = 2.0
+"""Height of fog over the heights at which densities are rebuilt, voxels."""
+
 MAX_FOG_OPTICAL_DEPTH = 0.5
 """Maximum optical depth of fog per voxel."""
 
@@ -59,6 +63,12 @@ VIEW_INDEPENDENCE_WEIGHT = 0.01
 """Weight of the penalty on view-dependent coefficients."""
 
 
+def load_solvers() -> None:
+    """Load the libraries that inpainting needs, which takes about as long as to inpaint a small hole."""
+    import scipy.interpolate
+    import scipy.sparse.linalg  # noqa: F401
+
+
 def inpaint_support(
     block: GridBlock, footprint: Footprint, removed: Mask, *, keep_removed: bool = False
 ) -> GridBlock:
@@ -67,26 +77,27 @@ def inpaint_support(
     removed [X,Y,Z]: mask of V^c. With `keep_removed`, beneath a continuous edit, no vertex of V^c changes.
     """
     check_cancelled()
-    vertices = np.argwhere(np.ones(block.shape, bool))
+    # Empty the crust of the part's surface between the support and V^c.
+    near_removed = dilate(removed, 4)
+    vertices = np.argwhere(near_removed | _near_support(block, footprint))
     u, v, height = footprint.locate(vertices.astype(np.float64))
     in_grid = u >= 0
     vertices, u, v, height = vertices[in_grid], u[in_grid], v[in_grid], height[in_grid]
     hole = footprint.hole[u, v]
-    around = footprint.surroundings[u, v] & ~removed[tuple(vertices.T)]
+    is_removed = removed[tuple(vertices.T)]
+    around = footprint.surroundings[u, v] & ~is_removed
     in_height = (height >= MIN_SUPPORT_HEIGHT_VOXELS) & (height <= MAX_SUPPORT_HEIGHT_VOXELS)
     # Keep content above V^c: it is not of the part.
-    is_removed = removed[tuple(vertices.T)]
     top = np.full(footprint.hole.shape, -np.inf)
     np.maximum.at(top, (u[is_removed], v[is_removed]), height[is_removed])
     nearest = ndimage.distance_transform_edt(np.isinf(top), return_distances=False, return_indices=True)
     hole &= height <= top[tuple(nearest)][u, v] + 0.5
     known_columns = (u[around], v[around], height[around])
-    hole &= ~_side_vertices(block, footprint, removed)[tuple(vertices.T)]
+    rows = np.flatnonzero(hole)
+    hole[rows] = ~_is_side(block, footprint, removed, vertices[rows], (u[rows], v[rows], height[rows]))
     if keep_removed:
         hole &= ~is_removed
     profile = _density_profile(block, vertices[around & in_height], height[around & in_height])
-    # Empty the crust of the part's surface between the support and V^c.
-    near_removed = ndimage.binary_dilation(removed, iterations=4)
     crust = hole & (height > MAX_SUPPORT_HEIGHT_VOXELS) & near_removed[tuple(vertices.T)]
     is_new = hole & in_height
     mask = np.zeros(block.shape, bool)
@@ -104,7 +115,9 @@ def inpaint_support(
     block = block.with_density(mask, values[mask], slots=True)
     if keep_removed:
         above_support = (
-            (around | hole) & (height > MIN_FOG_HEIGHT_VOXELS) & (height <= MAX_SUPPORT_HEIGHT_VOXELS + 2.0)
+            (around | hole)
+            & (height > MIN_FOG_HEIGHT_VOXELS)
+            & (height <= MAX_SUPPORT_HEIGHT_VOXELS + FOG_RANGE_VOXELS)
         )
         above_support &= _columns_beneath(footprint, np.argwhere(removed))[u, v]
         block = _remove_fog(
@@ -139,24 +152,46 @@ def _remove_fog(block: GridBlock, vertices: NDArray[np.int64], max_density: Arra
     return block.with_density(mask, values[mask])
 
 
-def _side_vertices(block: GridBlock, footprint: Footprint, removed: Mask) -> Mask:
-    """Mask [X,Y,Z] of the sides of the support's edge, away from the removed vertices [X,Y,Z]."""
+def _near_support(block: GridBlock, footprint: Footprint) -> Mask:
+    """Mask [X,Y,Z] of vertices at the heights that are rebuilt, or colored beneath a support."""
+    support = footprint.support
+    x, y, z = (
+        (np.arange(size) - center) * slope
+        for size, center, slope in zip(block.shape, support.point, support.normal, strict=True)
+    )
+    height = x[:, None, None] + y[:, None] + z
+    lowest, highest = float(footprint.height.min()), float(footprint.height.max())
+    is_deep = height < MIN_SUPPORT_HEIGHT_VOXELS + lowest
+    is_high = height > MAX_SUPPORT_HEIGHT_VOXELS + FOG_RANGE_VOXELS + highest
+    return np.asarray(~is_high & (~is_deep | (block.slot >= 0)))
+
+
+def _is_side(
+    block: GridBlock,
+    footprint: Footprint,
+    removed: Mask,
+    vertices: NDArray[np.int64],
+    place: tuple[NDArray[np.int64], NDArray[np.int64], Array],
+) -> NDArray[np.bool_]:
+    """Mask [N] of vertices [N,3] on the sides of the support's edge, away from the removed ones [X,Y,Z].
+
+    place: (u, v, height) of the vertices over the support.
+    """
     columns = ndimage.binary_fill_holes(footprint.surroundings | footprint.hole)
     edge = footprint.has_surface & columns & ~ndimage.binary_erosion(columns, iterations=EDGE_WIDTH_COLUMNS)
-    vertices = np.argwhere(ndimage.distance_transform_edt(~removed) > SIDE_DISTANCE_VOXELS)
-    u, v, height = footprint.locate(vertices.astype(np.float64))
-    normals = block.normals[tuple(vertices.T)]
-    cosine = normals @ footprint.support.normal
-    is_side = (
-        (u >= 0)
-        & edge[u, v]
-        & (height < MAX_COLOR_HEIGHT_VOXELS)
-        & (cosine < MAX_SIDE_COSINE)
-        & ((normals**2).sum(axis=1) > 0.25)
-    )
+    u, v, height = place
+    is_side = edge[u, v] & (height < MAX_COLOR_HEIGHT_VOXELS)
+    rows = np.flatnonzero(is_side)
     mask = np.zeros(block.shape, bool)
-    mask[tuple(vertices[is_side].T)] = True
-    return mask
+    mask[tuple(vertices[rows].T)] = True
+    normals = block.normals_at(mask)
+    distance = distances_near(removed, vertices[rows].astype(np.float64), SIDE_DISTANCE_VOXELS + 1.0)
+    is_side[rows] = (
+        (normals @ footprint.support.normal < MAX_SIDE_COSINE)
+        & ((normals**2).sum(axis=1) > 0.25)
+        & (distance > SIDE_DISTANCE_VOXELS)
+    )
+    return np.asarray(is_side)
 
 
 def _density_profile(block: GridBlock, vertices: NDArray[np.int64], height: Array) -> Array:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.surface_color import denoise_colors
@@ -46,23 +47,25 @@ class LightChange:
     log_ratio: Array
 
     @classmethod
-    def from_surfels(cls, block: GridBlock, surface: Surfels, logs: Array, spacing: float) -> LightChange:
+    def from_surfels(
+        cls, block: GridBlock, surface: Surfels, logs: Array, spacing: float, *, where: Mask | None = None
+    ) -> LightChange:
         """Change of light on a block's colored vertices, from log ratios [N] on surfels [N].
 
         spacing: distance of the surfels, world units. Vertices within MAX_LIGHT_DEPTH_VOXELS of a surface,
-        mostly beneath it, show through it, as fields are foggy there.
+        mostly beneath it, show through it, as fields are foggy there. With a mask `where` [X,Y,Z] only of
+        its vertices.
         """
         check_cancelled()
         changed_rows = np.flatnonzero(logs)
         mask, log = np.zeros(block.shape, bool), np.zeros(0)
         if len(changed_rows):
             radius = MAX_LIGHT_DEPTH_VOXELS * max(block.spacing)
-            g = block.block_coordinates(surface.points[changed_rows])
-            low = np.maximum(np.floor(g.min(axis=0) - MAX_LIGHT_DEPTH_VOXELS).astype(np.int64), 0)
-            high = np.ceil(g.max(axis=0) + MAX_LIGHT_DEPTH_VOXELS).astype(np.int64) + 1
-            box = tuple(slice(a, max(a, b)) for a, b in zip(low, high, strict=True))
-            mask[box] = block.slot[box] >= 0
-            points, normals = block.positions(mask), block.normals[mask]
+            box, is_near = _vertices_near(block, surface.points[changed_rows])
+            mask[box] = is_near & (block.slot[box] >= 0)
+            if where is not None:
+                mask &= where
+            points, normals = block.positions(mask), block.normals_at(mask)
 
             def mean_logs(part: slice) -> Array:
                 return _mean_logs(surface, logs, points[part], normals[part], radius, spacing)
@@ -100,6 +103,25 @@ class LightChange:
         values = np.zeros(block.shape)
         values[self.mask] = self.log_ratio
         return values
+
+
+def _vertices_near(block: GridBlock, points: Array) -> tuple[tuple[slice, ...], Mask]:
+    """(slices of a block, mask [x,y,z] of the vertices there within MAX_LIGHT_DEPTH_VOXELS of points [N,3]).
+
+    The light of all others stays: none of the surfels from which it is averaged has changed. The mask has
+    up to a voxel more.
+    """
+    g = block.block_coordinates(points)
+    low = np.maximum(np.floor(g.min(axis=0) - MAX_LIGHT_DEPTH_VOXELS).astype(np.int64), 0)
+    high = np.minimum(np.ceil(g.max(axis=0) + MAX_LIGHT_DEPTH_VOXELS).astype(np.int64) + 1, block.shape)
+    size = np.maximum(high - low, 0)
+    cells = np.clip(np.round(g).astype(np.int64) - low, 0, np.maximum(size - 1, 0))
+    is_far = np.ones(size, bool)
+    if is_far.size:
+        is_far[tuple(cells.T)] = False
+        reach = (MAX_LIGHT_DEPTH_VOXELS + 1.0) * max(block.spacing)
+        is_far = ndimage.distance_transform_edt(is_far, sampling=block.spacing) > reach
+    return tuple(slice(int(a), int(a + n)) for a, n in zip(low, size, strict=True)), ~is_far
 
 
 def _mean_logs(

@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.completion.surfaces.grid_block import (
+from cagefield.completion.surfaces.block_extraction import (
     VERTICES_PER_BATCH,
-    GridBlock,
     extract_block,
     sample_edited_field,
-    world_positions,
 )
+from cagefield.completion.surfaces.grid_block import GridBlock, world_positions
 from cagefield.edits import EditMap, EditStack, Paste
 from cagefield.edits.patch import Pasted
 from cagefield.fields.voxel_field import VoxelField

@@ -16,14 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.completion.surfaces.grid_block import (
-    SOLID_OPTICAL_DEPTH,
+from cagefield.completion.surfaces.block_extraction import (
     VERTICES_PER_BATCH,
-    GridBlock,
     extract_block,
     sample_edited_field,
-    world_positions,
 )
+from cagefield.completion.surfaces.grid_block import SOLID_OPTICAL_DEPTH, GridBlock, world_positions
 from cagefield.edits import Edit, EditMap, EditStack
 from cagefield.edits.patch import Pasted
 from cagefield.errors import EditError

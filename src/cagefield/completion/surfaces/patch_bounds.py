@@ -32,30 +32,39 @@ def extrude_box(box: Array, shadow_directions: Array) -> Array:
 
 
 def patch_box(
-    edit: Edit,
-    voxel: float,
-    max_radius: float,
-    *,
-    include_destination: bool = True,
-    shadow_directions: Array = NO_SHADOW_DIRECTIONS,
+    edit: Edit, voxel: float, max_radius: float, *, shadow_directions: Array = NO_SHADOW_DIRECTIONS
 ) -> Array:
-    """World-space box [2,3] (min, max) in which a discrete edit's patch is computed, and lies.
+    """World-space box [2,3] (min, max) in which the removal of a part changes content and light.
+
+    Of a paste the box around its place.
 
     Args:
         voxel: the longest edge of a voxel, world units.
         max_radius: the largest occlusion radius (`LightModel.max_radius`), world units; 0 if the light
             stays.
-        include_destination: whether the patch changes light, or blends a seam, at the part's new place.
         shadow_directions: directions [K,3] of cast shadows.
     """
     box = edit.inner.aabb if not isinstance(edit, Paste) else edit.deformed.aabb
-    box = extrude_box(box, shadow_directions)
+    return _with_margin(extrude_box(box, shadow_directions), voxel, max_radius)
+
+
+def destination_box(
+    edit: Edit, voxel: float, max_radius: float, *, shadow_directions: Array | None = None
+) -> Array | None:
+    """World-space box [2,3] in which a part changes light, or blends a seam, at its new place.
+
+    None where it does neither; arguments as in `patch_box`.
+    """
+    directions = NO_SHADOW_DIRECTIONS if shadow_directions is None else shadow_directions
+    has_seam = edit.feather > 0.0 and not isinstance(edit, Paste)
+    if max_radius == 0.0 and not len(directions) and not has_seam:
+        return None
+    return _with_margin(extrude_box(edit.deformed.aabb, directions), voxel, max_radius)
+
+
+def _with_margin(box: Array, voxel: float, max_radius: float) -> Array:
+    """Box [2,3] with room for a support, and for light; arguments as in `patch_box`."""
     margin = max(SUPPORT_DISTANCE_VOXELS * voxel, 0.5 * float(np.median(box[1] - box[0])))
     if max_radius > 0.0:
         margin = max(margin, 1.5 * max_radius + SUPPORT_DISTANCE_VOXELS * voxel)
-    if include_destination and (
-        max_radius > 0.0 or len(shadow_directions) or (edit.feather > 0.0 and not isinstance(edit, Paste))
-    ):
-        destination = extrude_box(edit.deformed.aabb, shadow_directions)
-        box = np.stack([np.minimum(box[0], destination[0]), np.maximum(box[1], destination[1])])
     return np.asarray(box + margin * np.array([[-1.0], [1.0]]))

@@ -49,9 +49,17 @@ def voxelize_splats(splats: SplatField, box: Array, voxel: float, *, has_colors:
 
     `voxel` is the edge of a voxel, world units; the box grows to a whole number of them.
     """
-    check_cancelled()
     count = np.maximum(np.ceil((box[1] - box[0]) / voxel).astype(np.int64), 2) + 1
-    bounds = box.mean(axis=0) + 0.5 * voxel * (count - 1) * np.array([[-1.0], [1.0]])
+    low = box.mean(axis=0) - 0.5 * voxel * (count - 1)
+    return voxelize_vertices(splats, low, voxel, count, has_colors=has_colors)
+
+
+def voxelize_vertices(
+    splats: SplatField, low: Array, voxel: float, count: NDArray[np.int64], *, has_colors: bool = True
+) -> VoxelField:
+    """Voxel field of splats at `count` [3] vertices, `voxel` apart from `low` [3] (`voxelize_splats`)."""
+    check_cancelled()
+    bounds = low + voxel * (count - 1) * np.array([[0.0], [1.0]])
     wide = _widen_splats(splats, bounds, voxel)
     check_cancelled()
     covered = _covered_vertices(wide, bounds[0], voxel, count)

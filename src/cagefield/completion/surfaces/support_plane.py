@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from cagefield.completion.surfaces.near_masks import distances_near
 from cagefield.completion.surfaces.plane_snapping import snap_to_planes
 from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.compute.cancellation import check_cancelled
@@ -97,10 +98,7 @@ def _fit_plane(
     """(point [3], normal [3]) of the plane of surfels [N] under the vertices [M,3] of a part, or None."""
     size = float(np.median(np.ptp(vertices, axis=0))) + 1.0
     probe = max(4.0, 0.25 * size)
-    part_distance = ndimage.distance_transform_edt(~part)
-    distance = ndimage.map_coordinates(
-        part_distance, (coordinates + probe * normals).T, order=1, mode="nearest"
-    )
+    distance = distances_near(part, coordinates + probe * normals, 2.0 * probe)
     weight = np.clip(1.0 - distance / (2.0 * probe), 0.02, 1.0)
     rng = np.random.default_rng(seed)
     sample = rng.choice(len(coordinates), min(len(coordinates), 6000), replace=False)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from cagefield.edits import Continuous, Edit
+from cagefield.edits import Continuous, Copy, Delete, Edit, Move
 from cagefield.errors import CagefieldError
 from cagefield.server.editor.connected_edits import Wanted
 from cagefield.server.editor.identity_cache import IdentityCache
@@ -110,16 +110,16 @@ class BackgroundWork:
         self.light_known = self.light_known or not isinstance(result, Stopped)
 
     def _unlit(self) -> tuple[Edit, ...]:
-        """The last cage with light that follows it, after the edits below; none where light there is known.
+        """The last cage with light or infill that follows it, after the edits below; none where it is known.
 
-        Also a cage that moves nothing yet: its first drag takes the light around it.
+        Also a cage that moves nothing yet: its first drag takes the light around it, and the infill.
         """
         if self._session.moving:
             return ()
         entries = list(self._session.shown.applied)
         for number in reversed(range(len(entries))):
             edit = entries[number].edit.without_parent
-            if isinstance(edit, Continuous) and edit.enabled and edit.relight != "none":
+            if _depends_on_surroundings(edit):
                 return () if edit in self._lit else (*self._session.drawn_below(number), edit)
         return ()
 
@@ -266,6 +266,15 @@ class BackgroundWork:
                 self._tell(_message(job, "failed", text))
 
         return BackgroundTask(lambda number: EndJobTask(number, job.number, keep), done)
+
+
+def _depends_on_surroundings(edit: Edit) -> bool:
+    """Whether light around an edit, or infill, is worth to be known before the edit moves."""
+    if not edit.enabled:
+        return False
+    if isinstance(edit, Move | Delete) and edit.fill != "none":
+        return True
+    return isinstance(edit, Continuous | Move | Delete | Copy) and edit.relight != "none"
 
 
 def _message(job: Job, state: str, text: str = "") -> server_messages.Job:

@@ -8,7 +8,7 @@ import numpy as np
 
 from cagefield.completion.continuous_relighting import light_box
 from cagefield.completion.lighting.ambient_occlusion import RADII_DIAGONALS, occlusion_radii
-from cagefield.completion.patcher import needs_patch, needs_relighting
+from cagefield.completion.patch_stages import needs_patch, needs_relighting
 from cagefield.completion.surfaces.patch_bounds import ANY_SHADOW_DIRECTIONS, NO_SHADOW_DIRECTIONS, patch_box
 from cagefield.completion.surfaces.splat_voxelization import max_voxel_size
 from cagefield.edits import Continuous, Edit

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from cagefield.completion.patcher import PatchStage
+from cagefield.completion.patch_stages import PatchStage
 from cagefield.edits import Continuous, Edit, PreparedStack
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.render_worker.refinement import FINAL, Refinement
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
 QUICK_LATTICE = 32
 """Most lattice nodes along an axis while a cage is dragged."""
 
+
+MAX_MERGED_SECONDS = 1.5
+"""Time in which holes are inpainted, up to which no picture comes before the final one: light takes no longer
+where all else is exact, and a picture on the way would delay it by a third."""
 
 KEPT_FINAL = 2
 """Final renderers that are kept: of the pages' pictures, and of a job's."""
@@ -35,8 +40,8 @@ class PatchSource(Protocol):
     ) -> PreparedStack:
         """Stack of the edits with their patches of a stage (`Patcher.prepare`)."""
 
-    def attained_stage(self, edits: Sequence[Edit]) -> PatchStage:
-        """Last stage whose patches are those of stage CACHED (`Patcher.attained_stage`)."""
+    def attained_stage(self, prepared: PreparedStack, *, preserve_opacity: bool = ...) -> PatchStage:
+        """Last stage whose patches a stack of `prepare` has already (`Patcher.attained_stage`)."""
 
 
 @dataclass(frozen=True)
@@ -96,16 +101,24 @@ class EditedRenderers:
             exact = (kept.edits for kept in self._kept if not kept.refinement.is_coarse)
             ready = {id(edit) for each in exact for edit in each}
             shown = [edit if id(edit) in ready else self._quickly(edit) for edit in shown]
+        began = time.perf_counter()
         stack = self._patcher.prepare(
             shown, stage=PATCH_STAGES[refinement], preserve_opacity=preserve_opacity, proceed=proceed
         )
+        patches = self._patcher.attained_stage(stack, preserve_opacity=preserve_opacity)
+        is_quick = time.perf_counter() - began < MAX_MERGED_SECONDS
+        bends = any(isinstance(edit, Continuous) and _is_active(edit) for edit in wanted)
+        is_awaited = refinement in (Refinement.INPAINTED, Refinement.EXACT)
+        if is_awaited and is_quick and not bends and patches is PatchStage.INPAINTED:
+            refinement, patches = FINAL, PatchStage.LIT
+            stack = self._patcher.prepare(shown, preserve_opacity=preserve_opacity, proceed=proceed)
+        attained = attained_refinement(refinement, wanted, patches, splits=not self._is_sampled)
         # Occupancy under edits that both share is kept.
         alike = [kept for kept in self._kept if kept.refinement.is_coarse == refinement.is_coarse]
         base = (alike or self._kept)[-1].renderer if alike or self._kept else self._plain
         renderer = base.with_edits(
             stack, preserve_opacity=preserve_opacity, coarse=refinement.is_coarse, proceed=proceed
         )
-        attained = attained_refinement(refinement, wanted, self._patcher)
         made = RefinedRenderer(wanted, preserve_opacity, attained, renderer)
         final = [kept for kept in self._kept if kept.refinement == FINAL]
         if attained == FINAL:
@@ -132,14 +145,23 @@ PATCH_STAGES = {
 """Patches of each refinement."""
 
 
-def attained_refinement(made: Refinement, edits: Sequence[Edit], patcher: PatchSource) -> Refinement:
-    """The last refinement that a picture of edits `made` with one has: those after it change nothing."""
-    patches = patcher.attained_stage(edits)
+def attained_refinement(
+    made: Refinement, edits: Sequence[Edit], patches: PatchStage, *, splits: bool
+) -> Refinement:
+    """The last refinement that a picture of edits `made` with one has: those after it change nothing.
+
+    patches: the stage that the picture's patches have attained; splits: whether elements are split where an
+    edit cuts or bends them.
+    """
     is_coarse = made.is_coarse and any(
-        isinstance(edit, Continuous) and edit.enabled and edit.changes_anything for edit in edits
+        _is_active(edit) and (splits or isinstance(edit, Continuous)) for edit in edits
     )
     if made < Refinement.INPAINTED and patches < PatchStage.INPAINTED:
         return made
     if is_coarse:
         return max(made, Refinement.INPAINTED)
     return max(made, Refinement.EXACT) if patches < PatchStage.LIT else FINAL
+
+
+def _is_active(edit: Edit) -> bool:
+    return edit.enabled and edit.changes_anything

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 
-from cagefield.completion.patcher import PatchStage
+from cagefield.completion.patch_stages import PatchStage
 from cagefield.edits import Edit, Paste, PreparedStack
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
@@ -31,7 +31,7 @@ class Unpatched:
         """Stack of the edits alone, pastes left out."""
         return PreparedStack(edit for edit in edits if not isinstance(edit, Paste))
 
-    def attained_stage(self, edits: Sequence[Edit]) -> PatchStage:
+    def attained_stage(self, prepared: PreparedStack, *, preserve_opacity: bool = True) -> PatchStage:
         """The last stage: nothing refines a picture without patches."""
         return PatchStage.LIT
 

@@ -125,7 +125,7 @@ class PageFiles:
         if removed is not None:
             changed = changed.of_whole(removed.mask)
         content = encode_page_splat_edits(whole, changed)
-        attained = attained_refinement(task.refinement, shown, patcher)
+        attained = attained_refinement(task.refinement, shown, patcher.attained_stage(edits), splits=True)
         return EditsDone(task.number, content, (), attained, mapped - began, time.perf_counter() - mapped)
 
     def _prepared(self, edit: Edit) -> Edit:

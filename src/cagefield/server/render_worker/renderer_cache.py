@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cagefield.cameras.camera import Camera
+from cagefield.completion.inpainting.support_inpainting import load_solvers
 from cagefield.edits import Continuous, Edit, EditStack
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
@@ -114,6 +115,8 @@ class RendererCache:
 
     def warm(self, stage: WarmStage) -> None:
         """Makes the kernels of one stage ready, on a small edit."""
+        if stage is WarmStage.DELETION:
+            load_solvers()
         if not self._is_sampled:
             _warm_splats(stage)
             return

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cagefield.completion.patcher import PatchStage
+from cagefield.completion.patch_stages import PatchStage
 from cagefield.compute.cancellation import cancellable
 from cagefield.edits import Continuous, Edit, EditMap
 from cagefield.errors import EditError
