@@ -139,9 +139,9 @@ def test_small_splats_bend_further_than_large_ones_before_they_are_split() -> No
             rows = np.array([0])
             return len(split_children.bent_children(bend, rod(), rows, np.zeros((1, 3)), A, size, None).x)
 
-    assert children(split_children.SMALL_BEND, 1.1) > 0
-    assert children(split_children.SMALL_BEND / 2, 1.9) == 0
-    assert children(split_children.SMALL_BEND / 2, 2.2) > 0
+    assert children(split_children.SMALL_SHARE, 1.1) > 0
+    assert children(split_children.SMALL_SHARE / 2, 1.9) == 0
+    assert children(split_children.SMALL_SHARE / 2, 2.2) > 0
 
 
 def test_children_that_are_not_drawn_are_not_made() -> None:

@@ -188,13 +188,14 @@ def _base_place(met: NDArray[np.float32], row: NDArray[np.float32]) -> float | N
     `met` [E,WIDTH] are the earlier edits that it meets (`_meets`). A layer of the last one's region is that
     place, where the region holds all of it.
     """
-    if not len(met):
+    boxes = _moved_boxes(row)
+    if not len(met) or not boxes:
         return 0.0
     last, region = met[-1], met[-1, RECORDS + RECORD : RECORDS + 2 * RECORD]
     if last[CONTINUOUS] > 0.5 or last[FIRST] < 0.5 or last[LAST] < 1.5 or region[AFFINE] < 0.5:
         return None
     W, center = region[MATRIX : MATRIX + 9].reshape(3, 3), region[CENTER : CENTER + 3]
-    corners = np.concatenate([np.stack(np.meshgrid(*box.T), -1).reshape(-1, 3) for box in _moved_boxes(row)])
+    corners = np.concatenate([np.stack(np.meshgrid(*box.T), -1).reshape(-1, 3) for box in boxes])
     is_inside = np.abs((corners - center) @ W.T).max(initial=0.0) <= 1.0
     return float(last[UNDER_PLACE]) if is_inside else None
 

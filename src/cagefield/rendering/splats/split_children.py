@@ -30,11 +30,11 @@ from cagefield.warps.interfaces import Warp
 BEND = 0.08
 """Largest b of a splat that stays whole: a turn by 9 degrees from its middle to two standard deviations."""
 
-SMALL_BEND = 0.015
-"""Splats whose largest standard deviation is below this share of an edit's size may bend more, as much as
-they are smaller: at two standard deviations they are off by 2 pixels of 800 that the edit fills."""
+SMALL_SHARE = 0.015
+"""Splats whose largest standard deviation is below this share of an edit's size may bend and be shaded more,
+as much as they are smaller: those that stay are off by 2 pixels, at two of it, of 800 that the edit fills."""
 
-SHADE = 0.2
+SHADE = 0.15
 """Largest d of a splat that stays whole."""
 
 FAINT = 0.3
@@ -93,9 +93,13 @@ def bent_children(
     """Rows of children for the splats over which the map of an edit of a size, world units, bends."""
     warp = edit.exact_warp
     parts = map_parts(lambda part: _bend(warp, points[part], A[part], proceed), len(rows), PART_SPLATS)
-    largest = np.linalg.norm(A, axis=1).max(axis=1)
-    weight = np.minimum(1.0, largest / (SMALL_BEND * size))
-    return _rows(field, rows, np.concatenate(parts) * weight[:, None], BEND)
+    return _rows(field, rows, np.concatenate(parts) * _weights(A, size), BEND)
+
+
+def _weights(A: Array, size: float) -> Array:
+    """Weights [M,1] of changes over splats of axes A [M,3,3] under an edit of a size, see `SMALL_SHARE`."""
+    largest = np.linalg.norm(A, axis=1).max(axis=1, keepdims=True)
+    return np.asarray(np.minimum(1.0, largest / (SMALL_SHARE * size)))
 
 
 def _bend(warp: Warp, points: Array, A: Array, proceed: Callable[[], None] | None) -> Array:
@@ -195,9 +199,15 @@ def concatenate_children(parts: list[Children]) -> Children:
 
 
 def shaded_children(
-    edit: Edit, patch: SplatPatch, field: SplatField, rows: NDArray[np.int64], points: Array, A: Array
+    edit: Edit,
+    patch: SplatPatch,
+    field: SplatField,
+    rows: NDArray[np.int64],
+    points: Array,
+    A: Array,
+    size: float,
 ) -> Children:
-    """Rows of children for the splats over which the light of a patch changes."""
+    """Rows of children for the splats over which the light of a patch changes; size as `bent_children`."""
     # The cage of a paste is in another scene.
     inside = np.zeros(len(rows), bool) if isinstance(edit, Paste) else edit.inner.contains(points)
     change = np.zeros((len(rows), 3))
@@ -209,7 +219,7 @@ def shaded_children(
             long = here[:, None] & (length > 0.5 * light.spacing.max())
             middle, step = points[np.nonzero(long)[0]], steps[long]
             change[long] = np.ptp([light.at(middle + way * step) for way in (-1.0, 0.0, 1.0)], axis=0)
-    return _rows(field, rows, change, SHADE)
+    return _rows(field, rows, change * _weights(A, size), SHADE)
 
 
 def _crossing(

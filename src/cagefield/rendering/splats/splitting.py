@@ -17,7 +17,7 @@ F(m) + J A z, which is right as far as F is affine over it, and in one color. Th
   the convolution of N(0, r^2) and N(0, 1 - r^2), so children of the standard deviation r at distances of
   SPACING r, weighted by N(0, 1 - r^2), add up to it, but for a ripple of 2 exp(-2 (pi / SPACING)^2) = 0.1 %.
   With r = BEND / b_i they bend by BEND at most: b is proportional to the width. Of small splats b counts less
-  (`split_children.SMALL_BEND`). It is not where J jumps, on
+  (`split_children.SMALL_SHARE`). It is not where J jumps, on
   the faces of cages, and splats across these are split ROUNDS times. Opacities are such that
   the ray through the middle of each child loses as much in the row as it lost in the splat there. Optical
   depths add up, and
@@ -30,8 +30,8 @@ F(m) + J A z, which is right as far as F is affine over it, and in one color. Th
   plane. Of faint splats T is a normal distribution, and children have its moments where it is cut off.
 - Light. A patch (`edits.patch`) multiplies a splat's colors by one number. Where the log of that changes by
   d > SHADE among m - a_i, m and m + a_i the splat becomes a row along a_i as where it bends, with
-  r = SHADE / d, faint ones where it changes by more. It does not where a_i is shorter than half an edge of
-  the light's grid.
+  r = SHADE / d, faint and small ones where it changes by more. It does not where a_i is shorter than half
+  an edge of the light's grid.
 
 Each child goes its own way then. Children are canonical splats; of edits in a stack, each splits the splats
 of those before it. Steps of light alone come last, whatever their place in the stack: results of the others
@@ -230,12 +230,12 @@ def _split_once(
     edit = step.edit
     if step.is_light_alone:
         assert isinstance(step.patch, SplatPatch)
-        children = shaded_children(edit, step.patch, field, rows, points, A)
+        children = shaded_children(edit, step.patch, field, rows, points, A, _size(step))
     elif isinstance(edit, Discrete):
         children = cut_children(edit, field, rows, points, A)
         if isinstance(step.patch, SplatPatch):
             whole = np.flatnonzero(~np.isin(rows, children.parent))
-            lit = shaded_children(edit, step.patch, field, rows[whole], points[whole], A[whole])
+            lit = shaded_children(edit, step.patch, field, rows[whole], points[whole], A[whole], _size(step))
             children = concatenate_children([children, lit])
     else:
         children = bent_children(edit, field, rows, points, A, _size(step), proceed)
