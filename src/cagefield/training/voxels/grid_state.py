@@ -20,9 +20,10 @@ from cagefield.compute.devices import ints
 from cagefield.compute.quadrants import qd
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.rendering.voxels import occupancy
-from cagefield.rendering.voxels.device_grid import brick_order, transform_of
+from cagefield.rendering.voxels.device_grid import transform_of
 from cagefield.rendering.voxels.kernels.grid import GridArgs
 from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs
+from cagefield.rendering.voxels.layer_slots import brick_order
 from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS
 
 VERTICES_PER_CHUNK, MAX_THREADS = 2**16, 8
