@@ -320,7 +320,7 @@ def test_with_edits_shares_the_field_and_moves_what_it_says() -> None:
     before = scene.render(camera)
     edited = scene.with_edits(EditStack([Edit.move(Cage.box((0, 0, 0), 1.2)).translate((0, 0, 0.5))]))
     after = edited.render(camera)
-    assert edited.renderer.grid.base is scene.renderer.grid  # with the layers of its patch
+    assert edited.renderer.grid.slots is scene.renderer.grid.slots  # with the layers of its patch
     rows = [np.average(np.arange(48), weights=frame.opacity.sum(axis=1)) for frame in (before, after)]
     # 0.5 upwards at distance 3 and focal length 24 / tan(0.4) pixels
     assert rows[0] - rows[1] == pytest.approx(0.5 / 3 * 24 / np.tan(0.4), abs=0.5)
