@@ -62,3 +62,10 @@ def test_arrays_that_grow_leave_those_before_as_they_were() -> None:
     for layer, own in zip((first, large), numbers, strict=True):
         check_stored(longer, more, own, layer)
     check_stored(longer, more, shared.index[field.vertices], field)
+
+
+def test_a_field_without_vertices_takes_layers() -> None:
+    layer = field_of(40, 1)
+    empty = VoxelField(BOUNDS, (SIDE,) * 3, np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 4, 3)))
+    density, sh, (slots,) = LayerSlots(empty).store((layer,))
+    check_stored(density, sh, slots, layer)

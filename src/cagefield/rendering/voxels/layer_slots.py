@@ -45,7 +45,7 @@ class LayerSlots:
         self.index = np.zeros(int(np.prod(field.resolution)), np.int32)
         self.index[field.vertices[order]] = np.arange(1, len(order) + 1, dtype=np.int32)
         self._own = len(order) + 1
-        width = field.sh[0].size if len(field.sh) else 3
+        width = 3 * field.sh.shape[1]
         room = int(GROWTH * self._own)
         self._density, self._sh = np.empty(room, np.float32), np.empty(room * width, np.float32)
         self._density[0] = self._sh[:width] = 0.0
