@@ -20,7 +20,14 @@ from cagefield.completion.surfaces.block_union import (
     embed_mask,
     extend_block,
 )
-from cagefield.completion.surfaces.near_masks import dilate, distances_near, slices_around
+from cagefield.completion.surfaces.grid_block import NORMAL_DEVIATION_VERTICES
+from cagefield.completion.surfaces.near_masks import (
+    close_gaps,
+    dilate,
+    distances_near,
+    fill_cavities,
+    slices_around,
+)
 from cagefield.completion.surfaces.surfels import extract_surfels
 from cagefield.completion.surfaces.visibility import render_visibility
 from cagefield.edits import Edit, EditStack
@@ -100,8 +107,26 @@ def test_normals_around_a_mask_are_those_of_the_block() -> None:
     mask = np.zeros(block.shape, bool)
     mask[20:24, 10:16, 14:20] = True
     found = block.normals_at(mask)
-    assert "normals" not in block.__dict__ and (np.abs(found) > 0.1).any()
-    np.testing.assert_allclose(found, block.normals[mask], atol=1e-6)
+    assert (np.abs(found) > 0.1).any()
+    smooth = ndimage.gaussian_filter(1.0 - np.exp(-block.depth), NORMAL_DEVIATION_VERTICES)
+    slope = -np.stack(np.gradient(smooth), axis=-1) / field.voxel_size
+    length = np.maximum(np.linalg.norm(slope, axis=-1, keepdims=True), 1e-6)
+    np.testing.assert_allclose(found, (slope / length)[mask], atol=1e-5)
+    every = np.ones(block.shape, bool)
+    np.testing.assert_allclose(block.normals_at(every), (slope / length)[every], atol=1e-5)
+
+
+def test_gaps_and_cavities_are_those_of_scipy() -> None:
+    rng = np.random.default_rng(5)
+    for shape in ((3, 4, 5), (21, 30, 17)):
+        mask = ndimage.gaussian_filter(rng.standard_normal(shape), 1.5) > 0.0
+        padded = ndimage.binary_closing(np.pad(mask, 2), ndimage.generate_binary_structure(3, 2))
+        np.testing.assert_array_equal(close_gaps(mask), padded[2:-2, 2:-2, 2:-2])
+        shell = mask | ndimage.binary_dilation(mask)
+        np.testing.assert_array_equal(fill_cavities(shell), ndimage.binary_fill_holes(shell))
+    hollow = np.ones((5, 5, 5), bool)
+    hollow[2, 2, 2] = False
+    assert fill_cavities(hollow).all()
 
 
 def test_light_changes_only_around_surfels_whose_light_changed() -> None:
@@ -114,7 +139,7 @@ def test_light_changes_only_around_surfels_whose_light_changed() -> None:
     every = block.slot >= 0
     radius = light_change.MAX_LIGHT_DEPTH_VOXELS * voxel
     means = light_change._mean_logs(
-        surface, logs, block.positions(every), block.normals[every], radius, 2.0 * voxel
+        surface, logs, block.positions(every), block.normals_at(every), radius, 2.0 * voxel
     )
     whole = np.zeros(block.shape)
     whole[every] = np.nan_to_num(means)

@@ -20,7 +20,7 @@ def cached_names() -> list[str]:
 def test_properties_of_the_density_are_not_computed_again_for_other_colors() -> None:
     field = ball_field(radius=0.5)
     block = extract_block(field, EditStack(), field.bounds)
-    assert {"normals", "surface", "depth"} <= set(cached_names())
+    assert {"_smooth_opacity", "surface", "depth"} <= set(cached_names())
     values = {name: getattr(block, name) for name in cached_names()}
     mask = block.slot >= 0
     darker = block.scale_colors(mask, np.full(int(mask.sum()), 0.5))

@@ -15,7 +15,7 @@ from cagefield.completion.surfaces.block_extraction import extract_block
 from cagefield.completion.surfaces.plane_snapping import snap_to_planes
 from cagefield.completion.surfaces.surfels import (
     FAR_DISTANCE,
-    QUERY_POINTS,
+    PART_POINTS,
     Surfels,
     build_distance_grid,
     concatenate_surfels,
@@ -229,7 +229,7 @@ def test_a_part_that_stands_free_is_not_thinned_by_its_seam() -> None:
 def test_searches_for_neighbors_are_cancelled_between_parts() -> None:
     rng = np.random.default_rng(3)
     surfels = Surfels(rng.normal(size=(500, 3)), rng.normal(size=(500, 3)))
-    points = rng.normal(size=(2 * QUERY_POINTS + 7, 3))
+    points = rng.normal(size=(2 * PART_POINTS + 7, 3))
     distances, rows = cKDTree(surfels.points).query(points, k=3, distance_upper_bound=0.4)
     asked: list[int] = []
     with cancellable(lambda: asked.append(len(asked))):

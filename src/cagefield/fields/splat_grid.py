@@ -21,8 +21,8 @@ from cagefield.fields.splat_field import SplatField
 from cagefield.fields.splat_mixture import PackedSplats
 from cagefield.typing import Array, Float32, Mask
 
-SLABS_PER_THREAD = 4
-"""Slabs of a grid for each thread: some hold more splats than others."""
+SLABS_PER_THREAD = 16
+"""Slabs of a grid for each thread: some hold more splats, and a computation can be cancelled between them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +33,19 @@ class SplatGrid:
     low: Array
     edge: float
     count: tuple[int, int, int]
+
+    def covered(self, deviations: float) -> Mask:
+        """Mask [X,Y,Z] of the vertices in the boxes around splats, up to so many standard deviations."""
+        from cagefield.fields.kernels.splat_grid import mark_boxes
+
+        packed, covered = self._packed, np.zeros(self.count, bool)
+        half = deviations / np.sqrt(packed.rows[:, 13:14].astype(np.float64)) * packed.half
+
+        def mark(first: int, end: int) -> None:
+            mark_boxes(packed.rows, half, self.low, self.edge, first, covered[first:end])
+
+        self._in_slabs(mark)
+        return covered
 
     def density(self) -> Float32:
         """Density [X,Y,Z] per world unit, independent of the direction (`SplatMixture.grid_sigma`)."""

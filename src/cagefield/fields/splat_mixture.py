@@ -56,6 +56,9 @@ MIN_RAY_OPACITY = 1e-3
 MIN_CELL_SHARE = 2.0**-20
 """Minimum cell size, relative to the extent of all splats; it bounds cell coordinates."""
 
+PART_SPLATS = 1 << 13
+"""Number of splats that a thread packs at a time."""
+
 BLOCK_POINTS = 1 << 13
 """Number of points that a thread evaluates at a time."""
 
@@ -81,20 +84,25 @@ class PackedSplats:
         from cagefield.fields.kernels.splat_mixture import PACKED_FLOATS
 
         visible = np.flatnonzero(opacities > MIN_RAY_OPACITY)
-        opacity = np.minimum(opacities[visible].astype(np.float64), MAX_OPACITY)
-        scales = np.exp(log_scales[visible].astype(np.float64))
-        rotations = rotation_matrices(quaternions[visible].astype(np.float64))
-        end = 2.0 * np.log(opacity / MIN_RAY_OPACITY)
-        half = np.sqrt(end[:, None] * np.einsum("nij,nj->ni", rotations**2, scales**2))
         rows = np.empty((len(visible), PACKED_FLOATS), np.float32)
-        rows[:, :9] = (rotations.transpose(0, 2, 1) / scales[:, :, None]).reshape(-1, 9)
-        rows[:, 9:12] = means[visible]
-        rows[:, 12] = -np.log(opacity)
-        rows[:, 13] = end
-        thinnest = np.argmin(scales, axis=1)
-        layers = np.empty((len(visible), 4), np.float32)
-        layers[:, :3] = rows[:, :9].reshape(-1, 3, 3)[np.arange(len(visible)), thinnest]
-        layers[:, 3] = np.sqrt((scales**-2.0).mean(axis=1) / (2.0 * np.pi))
+        layers, half = np.empty((len(visible), 4), np.float32), np.empty((len(visible), 3))
+
+        def pack(part: slice) -> None:
+            splats = visible[part]
+            opacity = np.minimum(opacities[splats].astype(np.float64), MAX_OPACITY)
+            scales = np.exp(log_scales[splats].astype(np.float64))
+            rotations = rotation_matrices(quaternions[splats].astype(np.float64))
+            end = 2.0 * np.log(opacity / MIN_RAY_OPACITY)
+            half[part] = np.sqrt(end[:, None] * np.einsum("nij,nj->ni", rotations**2, scales**2))
+            axes = (rotations.transpose(0, 2, 1) / scales[:, :, None]).astype(np.float32)
+            rows[part, :9] = axes.reshape(-1, 9)
+            rows[part, 9:12] = means[splats]
+            rows[part, 12] = -np.log(opacity)
+            rows[part, 13] = end
+            layers[part, :3] = axes[np.arange(len(splats)), np.argmin(scales, axis=1)]
+            layers[part, 3] = np.sqrt((scales**-2.0).mean(axis=1) / (2.0 * np.pi))
+
+        map_parts(pack, len(visible), PART_SPLATS)
         return cls(visible, rows, layers, half)
 
 

@@ -60,11 +60,11 @@ def clone_cage(
         return filled
     _, nearest = cKDTree(rim_vertices).query(inner_vertices)
     # Pair surfaces of one side: an upper side continues an upper side.
-    normals = filled.normals
-    faces_alike = (normals[tuple(inner_vertices.T)] * normals[tuple(rim_vertices[nearest].T)]).sum(
-        axis=1
-    ) > 0.3
-    inner_vertices, nearest = inner_vertices[faces_alike], nearest[faces_alike]
+    inner_normals = filled.normals_at(inner_rim)
+    faces_alike = (inner_normals * filled.normals_at(rim)[nearest]).sum(axis=1) > 0.3
+    inner_vertices, inner_normals, nearest = (
+        each[faces_alike] for each in (inner_vertices, inner_normals, nearest)
+    )
     if not len(inner_vertices):
         return filled
     width = int(np.prod(sh.shape[1:]))
@@ -73,7 +73,7 @@ def clone_cage(
     vertices = np.argwhere(mask)
     count = min(RIM_NEIGHBORS, len(inner_vertices))
     distance, neighbors = cKDTree(inner_vertices).query(vertices, k=[*range(1, count + 1)])
-    cosine = np.einsum("nc,nkc->nk", normals[mask], normals[tuple(inner_vertices.T)][neighbors])
+    cosine = np.einsum("nc,nkc->nk", filled.normals_at(mask), inner_normals[neighbors])
     weight = np.maximum(cosine, 0.01) / np.maximum(distance, 0.5) ** 2
     weight /= weight.sum(axis=1, keepdims=True)
     correction = np.einsum("nk,nkc->nc", weight, (rim_sh - inner_sh)[neighbors])

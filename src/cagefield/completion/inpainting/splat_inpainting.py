@@ -240,8 +240,10 @@ class KnownSplats:
 def _upper_surface(block: GridBlock, is_new: Mask, up: Array) -> tuple[Array, Array]:
     """(block coordinates [A,3], unit normals [A,3]) of the upper side of the new vertices [X,Y,Z]."""
     solid = block.solid
-    mask = is_new & solid & ndimage.binary_dilation(~solid) & (block.normals @ up > MIN_UPPER_COSINE)
-    vertices, normals = np.argwhere(mask).astype(np.float64), block.normals[mask].astype(np.float64)
+    mask = is_new & solid & ndimage.binary_dilation(~solid)
+    normals = block.normals_at(mask).astype(np.float64)
+    is_upper = normals @ up > MIN_UPPER_COSINE
+    vertices, normals = np.argwhere(mask)[is_upper].astype(np.float64), normals[is_upper]
     steps = np.arange(-2.0, 2.25, 0.25)
     samples = [
         ndimage.map_coordinates(block.depth, (vertices + step * normals).T, order=1, mode="nearest")

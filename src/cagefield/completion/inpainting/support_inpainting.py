@@ -177,6 +177,7 @@ def _is_side(
 
     place: (u, v, height) of the vertices over the support.
     """
+    check_cancelled()
     columns = ndimage.binary_fill_holes(footprint.surroundings | footprint.hole)
     edge = footprint.has_surface & columns & ~ndimage.binary_erosion(columns, iterations=EDGE_WIDTH_COLUMNS)
     u, v, height = place
@@ -196,6 +197,7 @@ def _is_side(
 
 def _density_profile(block: GridBlock, vertices: NDArray[np.int64], height: Array) -> Array:
     """Median densities [H] at heights MIN_SUPPORT_HEIGHT_VOXELS, +0.5, ... over the support."""
+    check_cancelled()
     heights = np.arange(MIN_SUPPORT_HEIGHT_VOXELS, MAX_SUPPORT_HEIGHT_VOXELS + 0.25, 0.5)
     values = block.density[tuple(vertices.T)]
     profile = np.zeros(len(heights))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cagefield.completion.surfaces.grid_block import GridBlock, world_positions
 from cagefield.compute.cancellation import check_cancelled
+from cagefield.compute.parallel_parts import map_parts
 from cagefield.edits import EditMap
 from cagefield.edits.grade import grade_sh
 from cagefield.edits.mapped_samples import SampleGrade
@@ -80,15 +81,20 @@ def extract_vertices(
 def _extract_stored(field: VoxelField, low: NDArray[np.int64], shape: NDArray[np.int64]) -> GridBlock:
     """Block of the field without edits, from vertex `low` [3] on."""
     _, ny, nz = field.resolution
-    rows = slice(*np.searchsorted(field.vertices, [low[0] * ny * nz, (low[0] + shape[0]) * ny * nz]))
-    vertices = field.vertices[rows]
-    positions = np.stack([vertices // (ny * nz), vertices // nz % ny, vertices % nz], axis=1) - low
-    inside = ((positions >= 0) & (positions < shape)).all(axis=1)
-    index = tuple(positions[inside].T)
+    # The stored vertices of a row of the block along z are neighbors in the field.
+    first = ((np.arange(shape[0]) + low[0])[:, None] * ny + np.arange(shape[1]) + low[1]).reshape(-1)
+    first = first * nz + low[2]
+    begin, end = np.searchsorted(field.vertices, np.stack([first, first + shape[2]]))
+    check_cancelled()
+    count = end - begin
+    rows = np.repeat(begin - np.cumsum(count) + count, count) + np.arange(count.sum())
+    index = field.vertices[rows] + np.repeat(np.arange(len(first)) * shape[2] - first, count)
     density, slot = np.zeros(shape, np.float32), np.full(shape, -1, np.int64)
-    density[index] = field.density[rows][inside]
-    slot[index] = np.arange(int(inside.sum()))
-    return GridBlock(field, low, density, slot, field.sh[rows][inside])
+    density.flat[index] = field.density[rows]
+    slot.flat[index] = np.arange(len(rows))
+    sh = np.empty((len(rows), *field.sh.shape[1:]), np.float32)
+    map_parts(lambda part: field.sh.take(rows[part], 0, sh[part]), len(rows), VERTICES_PER_BATCH)
+    return GridBlock(field, low, density, slot, sh)
 
 
 def _sample_changed(

@@ -6,13 +6,13 @@ Notation: vertices of the block are numbered from its lowest one, whose grid coo
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.completion.surfaces.near_masks import slices_around
+from cagefield.completion.surfaces.near_masks import close_gaps, fill_cavities, map_slabs, slices_around
 from cagefield.compute.cancellation import check_cancelled
 from cagefield.fields.contraction import uncontract
 from cagefield.fields.sh import C0, scale_sh_colors
@@ -31,6 +31,9 @@ SOLID_OPTICAL_DEPTH = 0.3
 OCCUPIED_OPTICAL_DEPTH = 0.12
 """Minimum optical depth per voxel of fog that counts as occupied in gaps of solid vertices."""
 
+
+NORMAL_DEVIATION_VERTICES = 1.2
+"""Standard deviation of the Gaussian with which opacity is smoothed for normals, vertices."""
 
 NORMAL_REACH_VERTICES = 7
 """Vertices around one that its normal depends on: the support of the Gaussian, and of the gradient."""
@@ -85,37 +88,47 @@ class GridBlock:
         Photos do not constrain the density behind a surface: fields are hollow there, or foggy.
         """
         check_cancelled()
-        solid = np.pad(self.solid, 2)
-        closed = ndimage.binary_closing(solid, ndimage.generate_binary_structure(3, 2))[2:-2, 2:-2, 2:-2]
-        return np.asarray(
-            ndimage.binary_fill_holes(self.solid | (closed & (self.depth > OCCUPIED_OPTICAL_DEPTH)))
-        )
+        closed = close_gaps(self.solid) & (self.depth > OCCUPIED_OPTICAL_DEPTH)
+        check_cancelled()
+        return fill_cavities(self.solid | closed)
 
     @cached_property
     def surface(self) -> Mask:
         """Mask [X,Y,Z] of the outermost solid vertices with a defined normal."""
-        has_normal = (self.normals**2).sum(axis=-1) > 0.25
-        return np.asarray(self.solid & ndimage.binary_dilation(~self.occupied) & has_normal)
+        surface = self.solid & ndimage.binary_dilation(~self.occupied)
+        surface[surface] = (self.normals_at(surface) ** 2).sum(axis=-1) > 0.25
+        return surface
 
     @cached_property
-    def normals(self) -> Float32:
-        """Unit normals [X,Y,Z,3], against the gradient of the smoothed opacity; 0 without a gradient."""
-        if min(self.shape) < 3:
-            return np.zeros((*self.shape, 3), np.float32)
-        check_cancelled()
-        smooth = ndimage.gaussian_filter(1.0 - np.exp(-self.depth), 1.2)
-        check_cancelled()
-        slope = -np.stack(np.gradient(smooth), axis=-1) / self.field.voxel_size.astype(np.float32)
-        check_cancelled()
-        length = np.sqrt(np.einsum("xyza,xyza->xyz", slope, slope))[..., None]
-        return np.asarray(slope / np.maximum(length, 1e-6), np.float32)
+    def _smooth_opacity(self) -> Float32:
+        """Opacity [X,Y,Z] of vertices after a Gaussian filter."""
+        values = map_slabs(lambda slab: np.float32(1.0) - np.exp(-slab), self.depth, 0)
+        for axis in range(3):
+            smooth = partial(ndimage.gaussian_filter1d, sigma=NORMAL_DEVIATION_VERTICES, axis=axis)
+            values = map_slabs(smooth, values, 1 if axis == 0 else 0)
+        return values
 
     def normals_at(self, mask: Mask) -> Float32:
-        """Unit normals [N,3] at the vertices of a mask [X,Y,Z]: `normals`, computed around the mask alone."""
+        """Unit normals [N,3] at the vertices of a mask [X,Y,Z]; 0 without a gradient.
+
+        Normals are against the gradient of the smoothed opacity, which is computed around the mask alone.
+        """
+        if min(self.shape) < 3:
+            return np.zeros((np.count_nonzero(mask), 3), np.float32)
         around = slices_around(mask, NORMAL_REACH_VERTICES)
-        if "normals" in self.__dict__ or not mask[around].size:
-            return self.normals[mask]
-        return replace(self, density=self.density[around]).normals[mask[around]]
+        if "_smooth_opacity" not in self.__dict__ and mask[around].size not in (0, mask.size):
+            return replace(self, density=self.density[around]).normals_at(mask[around])
+        vertices = np.nonzero(mask)
+        slope = np.empty((len(vertices[0]), 3), np.float32)
+        for axis, place in enumerate(vertices):
+            before, after = np.maximum(place - 1, 0), np.minimum(place + 1, self.shape[axis] - 1)
+            low, high = (
+                self._smooth_opacity[tuple(end if n == axis else vertices[n] for n in range(3))]
+                for end in (before, after)
+            )
+            slope[:, axis] = (low - high) / ((after - before) * np.float32(self.field.voxel_size[axis]))
+        length = np.sqrt(np.einsum("na,na->n", slope, slope))[:, None]
+        return np.asarray(slope / np.maximum(length, 1e-6), np.float32)
 
     def positions(self, mask: Mask) -> Array:
         """World positions [N,3] of the vertices of a mask [X,Y,Z]."""

@@ -10,8 +10,7 @@ from cagefield.fields.sh import C0
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.splat_grid import SplatGrid
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.geometry.quaternions import rotation_matrices
-from cagefield.typing import Array, Mask
+from cagefield.typing import Array
 
 MAX_BOUNDS_VOXELS = 128
 """Voxels along the longest edge of the bounds of splats, for the fit of a light model."""
@@ -62,10 +61,8 @@ def voxelize_vertices(
     bounds = low + voxel * (count - 1) * np.array([[0.0], [1.0]])
     wide = _widen_splats(splats, bounds, voxel)
     check_cancelled()
-    covered = _covered_vertices(wide, bounds[0], voxel, count)
-    check_cancelled()
     grid = SplatGrid(wide, bounds[0], voxel, (int(count[0]), int(count[1]), int(count[2])))
-    density = np.where(covered, grid.density(), np.float32(0.0))
+    density = np.where(grid.covered(SPLAT_RADIUS_DEVIATIONS), grid.density(), np.float32(0.0))
     check_cancelled()
     is_stored = density * voxel > MIN_OPTICAL_DEPTH
     colors = grid.colors(is_stored) if has_colors else np.full((np.count_nonzero(is_stored), 3), 0.5)
@@ -93,21 +90,3 @@ def _widen_splats(splats: SplatField, bounds: Array, voxel: float) -> SplatField
         splats.sh[rows, :1],
         bounds=bounds,
     )
-
-
-def _covered_vertices(splats: SplatField, low: Array, voxel: float, count: NDArray[np.int64]) -> Mask:
-    """Mask [X,Y,Z] of a grid's vertices in the bounding boxes of splats."""
-    axes = rotation_matrices(splats.quaternions.astype(np.float64))
-    half = SPLAT_RADIUS_DEVIATIONS * np.sqrt(
-        np.einsum("nij,nj->ni", axes**2, np.exp(2.0 * splats.log_scales))
-    )
-    first = np.clip(np.ceil((splats.means - half - low) / voxel).astype(np.int64), 0, count)
-    end = np.clip(np.floor((splats.means + half - low) / voxel).astype(np.int64) + 1, 0, count)
-    # A box is a pattern of signs at its corners; cumulative sums along the axes count the boxes at a vertex.
-    ends = np.stack([first, end])
-    corners = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(8, 3)
-    places = [np.ravel_multi_index(ends[corner, :, range(3)], tuple(count + 1)) for corner in corners]
-    signs = np.repeat((-1.0) ** corners.sum(axis=1), len(first))
-    steps = np.bincount(np.concatenate(places), signs, int(np.prod(count + 1))).reshape(count + 1)
-    covering = steps.cumsum(0).cumsum(1).cumsum(2)[:-1, :-1, :-1]
-    return np.asarray(covering > 0)

@@ -78,7 +78,6 @@ def denoise_colors(block: GridBlock, where: Mask, log: Array) -> GridBlock:
 
 def colors_along_normals(block: GridBlock, surface: Surfels) -> tuple[Float32, Float32]:
     """(spherical-harmonics coefficients [N,K,3], opacity [N]) rendered along the normals of surfels [N]."""
-    check_cancelled()
     start, size = block.block_coordinates(surface.points), np.array(block.shape)
     direction = surface.normals / np.array(block.spacing)
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -86,6 +85,7 @@ def colors_along_normals(block: GridBlock, surface: Surfels) -> tuple[Float32, F
     colors = np.zeros((len(start), flat.shape[1]), np.float32)
     transmittance = np.ones(len(start), np.float32)
     for depth in np.arange(-RAY_START_VOXELS, RAY_END_VOXELS + 0.5 * RAY_STEP_VOXELS, RAY_STEP_VOXELS):
+        check_cancelled()
         point = start - depth * direction
         inside = ((point >= 0.0) & (point <= size - 1)).all(axis=1)
         base = np.clip(np.floor(point).astype(np.int64), 0, size - 2)

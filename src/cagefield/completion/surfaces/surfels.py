@@ -23,7 +23,7 @@ from cagefield.compute.cancellation import check_cancelled
 from cagefield.compute.parallel_parts import map_parts
 from cagefield.geometry import hexahedron
 from cagefield.geometry.cage import Cage
-from cagefield.typing import Array, Mask
+from cagefield.typing import Array, Float32, Mask
 
 FAR_DISTANCE = 1e9
 """Distance that stands for "beyond the search radius"."""
@@ -62,6 +62,9 @@ class DistanceFunction(Protocol):
 CELL_OFFSET_SHARE = 0.37
 """Offset of the cells of `Surfels.downsample`, as a share of a cell's edge."""
 
+MAX_CELL_KEY = 2.0**62
+"""Number of cells of `Surfels.downsample` that an index of 64 bits holds."""
+
 MAX_CELLS_PER_AXIS = 256
 """Maximum number of cells of a distance grid along its longest axis."""
 
@@ -71,8 +74,8 @@ HIDDEN_DEPTH_VOXELS = 8.0
 DUPLICATE_DISTANCE_VOXELS = 1.5
 """Distance from a visible surface up to which a block's own surfels are duplicates, voxels."""
 
-QUERY_POINTS = 2048
-"""Points of one query for neighbors, between which a computation can be cancelled."""
+PART_POINTS = 2048
+"""Points of one part of a computation, between which it can be cancelled."""
 
 MIN_SMOOTHING_COSINE = 0.7
 """Minimum cosine between normals that are averaged."""
@@ -87,7 +90,8 @@ class Surfels:
 
     @cached_property
     def _tree(self) -> cKDTree:
-        return cKDTree(self.points)
+        # Built in half the time of a balanced tree; queries take no longer.
+        return cKDTree(self.points, balanced_tree=False, compact_nodes=False)
 
     def distances_and_sides(self, points: Array, radius: float = np.inf) -> tuple[Array, NDArray[np.bool_]]:
         """(distances [M] of points [M,3] to the nearest surfel, mask [M] of points behind that surfel).
@@ -144,7 +148,7 @@ class Surfels:
             check_cancelled()
             distances[part], rows[part] = tree.query(points[part], k=neighbors, distance_upper_bound=radius)
 
-        map_parts(query, len(points), QUERY_POINTS)
+        map_parts(query, len(points), PART_POINTS)
         return distances, rows
 
     def take(self, rows: Mask | NDArray[np.int64]) -> Surfels:
@@ -173,8 +177,10 @@ class Surfels:
             return self
         # Surfaces often lie at whole numbers, where rounding errors would decide on their cells.
         cell = np.floor(self.points / edge + CELL_OFFSET_SHARE).astype(np.int64)
-        # Ranks instead of indices: surfaces of an unbounded scene may be millions of cells away.
-        cell = np.stack([np.unique(column, return_inverse=True)[1] for column in cell.T], axis=1)
+        cell -= cell.min(axis=0)
+        if np.prod(cell.max(axis=0) + 1.0) * 6.0 >= MAX_CELL_KEY:
+            # Ranks instead of indices: surfaces of an unbounded scene may be millions of cells away.
+            cell = np.stack([np.unique(column, return_inverse=True)[1] for column in cell.T], axis=1)
         axis = np.argmax(np.abs(self.normals), axis=1)
         side = 2 * axis + (np.take_along_axis(self.normals, axis[:, None], axis=1)[:, 0] > 0.0)
         size = cell.max(axis=0) + 1
@@ -245,29 +251,35 @@ def extract_surfels(block: GridBlock) -> Surfels:
     vertices = np.argwhere(block.surface)
     if not len(vertices):
         return Surfels(np.zeros((0, 3)), np.zeros((0, 3)))
-    normals = block.normals[tuple(vertices.T)].astype(np.float64)
+    normals = block.normals_at(block.surface).astype(np.float64)
     direction = normals / np.array(block.spacing)
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    steps = PROBE_START_VOXELS - PROBE_STEP_VOXELS * np.arange(PROBE_COUNT)
-    depth = np.stack(
-        [
-            ndimage.map_coordinates(block.depth, (vertices + step * direction).T, order=1, mode="nearest")
-            for step in steps
-        ]
-    )
-    optical_depth = np.cumsum(PROBE_STEP_VOXELS * depth, axis=0)
-    is_half = optical_depth >= np.minimum(HALF_OPTICAL_DEPTH, 0.5 * optical_depth[-1])
-    first = np.argmax(is_half, axis=0)
-    rows = np.arange(len(vertices))
-    # Optical depth grows linearly between two steps.
-    missing = np.minimum(HALF_OPTICAL_DEPTH, 0.5 * optical_depth[-1]) - np.where(
-        first > 0, optical_depth[first - 1, rows], 0.0
-    )
-    share = np.clip(missing / np.maximum(PROBE_STEP_VOXELS * depth[first, rows], 1e-9), 0.0, 1.0)
-    g = vertices + (steps[first] - PROBE_STEP_VOXELS * (share - 0.5))[:, None] * direction
+
+    def find(part: slice) -> Array:
+        return _half_transmittance(block.depth, vertices[part], direction[part])
+
+    g = np.concatenate(map_parts(find, len(vertices), PART_POINTS))
     middle = 0.5 * (block.stride - 1)
     points = world_positions(block.field, block.stride * g + block.low + middle)
     return Surfels(points, _smooth_normals(points, normals, 2.5 * max(block.spacing)))
+
+
+def _half_transmittance(depth: Float32, vertices: NDArray[np.int64], direction: Array) -> Array:
+    """Block coordinates [N,3] at which rays against a `direction` [N,3] of vertices lose half of their light.
+
+    depth [X,Y,Z]: optical depth over the edge of a voxel; directions are unit vectors of block coordinates.
+    """
+    steps = PROBE_START_VOXELS - PROBE_STEP_VOXELS * np.arange(PROBE_COUNT)
+    places = vertices + steps[:, None, None] * direction
+    values = ndimage.map_coordinates(depth, np.moveaxis(places, -1, 0), order=1, mode="nearest")
+    optical_depth = np.cumsum(PROBE_STEP_VOXELS * values, axis=0)
+    half = np.minimum(HALF_OPTICAL_DEPTH, 0.5 * optical_depth[-1])
+    first = np.argmax(optical_depth >= half, axis=0)
+    rows = np.arange(len(vertices))
+    # Optical depth grows linearly between two steps.
+    missing = half - np.where(first > 0, optical_depth[first - 1, rows], 0.0)
+    share = np.clip(missing / np.maximum(PROBE_STEP_VOXELS * values[first, rows], 1e-9), 0.0, 1.0)
+    return vertices + (steps[first] - PROBE_STEP_VOXELS * (share - 0.5))[:, None] * direction
 
 
 def extract_cut_faces(block: GridBlock, cage: Cage) -> Surfels:
@@ -289,15 +301,17 @@ def extract_cut_faces(block: GridBlock, cage: Cage) -> Surfels:
 
 def _smooth_normals(points: Array, normals: Array, radius: float) -> Array:
     """Unit normals [N,3], averaged over points [N,3] within `radius` that face similarly."""
-    check_cancelled()
     count = min(SMOOTHING_NEIGHBORS, len(points))
-    distances, rows = cKDTree(points).query(
-        points, k=[*range(1, count + 1)], distance_upper_bound=radius, workers=-1
-    )
+    distances, rows = Surfels(points, normals).nearest(points, count, radius)
     in_radius = np.isfinite(distances)
     rows = np.where(in_radius, rows, 0)
     for _ in range(SMOOTHING_ROUNDS):
-        normals = average_normals(normals, normals[rows], in_radius, MIN_SMOOTHING_COSINE)
+        before = normals
+
+        def average(part: slice, before: Array = before) -> Array:
+            return average_normals(before[part], before[rows[part]], in_radius[part], MIN_SMOOTHING_COSINE)
+
+        normals = np.concatenate(map_parts(average, len(points), PART_POINTS))
     return normals
 
 

@@ -44,6 +44,19 @@ def column(packed, i, dx, dy):
 
 
 @njit(**FAST)
+def mark_boxes(packed, half, low, edge, first, covered):
+    """Sets the vertices of a slab `covered` [X,Y,Z] in the boxes of half extents [N,3] around splats."""
+    for i in range(len(packed)):
+        x0, x1 = axis_range(packed[i, 9], half[i, 0], low[0], edge, first, covered.shape[0])
+        y0, y1 = axis_range(packed[i, 10], half[i, 1], low[1], edge, 0, covered.shape[1])
+        z0, z1 = axis_range(packed[i, 11], half[i, 2], low[2], edge, 0, covered.shape[2])
+        for x in range(x0, x1):
+            for y in range(y0, y1):
+                for z in range(z0, z1):
+                    covered[x - first, y, z] = True
+
+
+@njit(**FAST)
 def add_densities(packed, layers, half, low, edge, first, sigma):
     """Add `grid_sigma` of splats to a slab `sigma` [X,Y,Z]; layers [N,4] as in `densities`."""
     for i in range(len(packed)):
