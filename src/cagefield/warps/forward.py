@@ -29,8 +29,8 @@ COARSE_STRAIN = 1.0
 On the boxes above it costs 2e-7 of the scene for a translation, 2e-3 for the turn by 140 degrees.
 """
 
-POINTS_PER_STEP = 65_536
-"""Points mapped between two calls of `proceed`."""
+POINTS_PER_STEP, COARSE_POINTS_PER_STEP = 65_536, 262_144
+"""Points mapped between two calls of `proceed`, exactly and coarsely."""
 
 
 def to_deformed(
@@ -49,10 +49,11 @@ def to_deformed(
         warp = replace(warp, shell=_FreeFormForward(flow))
     regions = _AffineRegions.of_warp(warp)
     parts = []
-    for first in range(0, max(len(points), 1), POINTS_PER_STEP):
+    size = COARSE_POINTS_PER_STEP if coarse else POINTS_PER_STEP
+    for first in range(0, max(len(points), 1), size):
         if proceed is not None:
             proceed()
-        part = points[first : first + POINTS_PER_STEP]
+        part = points[first : first + size]
         parts.append(warp.to_deformed(part) if regions is None else regions.to_deformed(part))
     if len(parts) == 1:
         return parts[0]
@@ -90,7 +91,7 @@ class _AffineRegions:
 
     def to_deformed(self, points: Array) -> Mapped:
         """As `ContinuousWarp.to_deformed`."""
-        from cagefield.warps.kernels.affine_regions import SHELL, map_regions
+        from cagefield.warps.kernels.affine_regions import SHELL, map_regions, put_rows
 
         count = len(points)
         images, jacobian = np.empty((count, 3)), np.empty((count, 3, 3))
@@ -100,7 +101,7 @@ class _AffineRegions:
         mapped = Mapped(images, jacobian, *np.zeros((2, count), dtype=bool))
         rest = np.flatnonzero(region == SHELL)
         if len(rest):
-            mapped.put(rest, *self.shell.to_deformed(points[rest]))
+            put_rows(rest, *self.shell.to_deformed(points[rest]), images, jacobian)
         return mapped
 
 

@@ -297,19 +297,19 @@ class Places:
 
         Values of moved splats are `moved` [M,...], or their own where it is None; `more` come after them.
         """
-        from cagefield.rendering.splats.kernels.deformation import gather
+        from cagefield.rendering.splats.kernels.deformation import gather, scatter
 
         if self._rows is None and moved is None and more is None:
             return values
         count = len(values) if self._rows is None else len(self._rows)
+        width = int(np.prod(values.shape[1:]))
         out = np.empty((count + (0 if more is None else len(more)), *values.shape[1:]), np.float32)
         if self._rows is None:
             out[:count] = values
         else:
-            width = int(np.prod(values.shape[1:]))
             gather(values.reshape(len(values), width), self._rows, out[:count].reshape(count, width))
         if moved is not None:
-            out[self.moved] = moved
+            scatter(moved.reshape(len(moved), width), self.moved, out[:count].reshape(count, width))
         if more is not None:
             out[count:] = more
         return _frozen(out)

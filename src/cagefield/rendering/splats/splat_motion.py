@@ -169,7 +169,7 @@ class MovedSplats:
         left[still[leaves[: len(still)]]] = True
         stays[near[leaves[len(still) :]]] = False
         come = np.flatnonzero(moves & ~mapped.lost)
-        jacobian = mapped.jacobian[come]
+        jacobian = _rows_of(mapped.jacobian, come)
         again = come >= len(still)
         if again.any():
             composed = np.ascontiguousarray(jacobian[again])
@@ -188,13 +188,13 @@ class MovedSplats:
             grade = SampleGrade.concatenate([known.take(stays), arrived])
         moved = MovedSplats(
             left,
-            _joined(self.source[stays], _joined(still, self.source[near])[come]),
-            _joined(self.points[stays], mapped.points[come]),
+            _joined(self.source[stays], _rows_of(_joined(still, self.source[near]), come)),
+            _joined(self.points[stays], _rows_of(mapped.points, come)),
             _joined(self.jacobian[stays], jacobian),
             gains,
             grade,
         )
-        return moved, points[come]
+        return moved, _rows_of(points, come)
 
     def _patched(self, edit: Edit, patch: SplatPatch, splats: SplatSet, carried: Array) -> MovedSplats:
         """These with the patch of the edit that moved them; `carried` [C,3] is where its last rows were."""
@@ -234,6 +234,11 @@ class MovedSplats:
             fresh = SampleGrade.neutral(len(source) - len(known.density))
             grade = SampleGrade.concatenate([known, fresh])
         return MovedSplats(left, source, points, jacobian, gains, grade)
+
+
+def _rows_of(values: NDArray[Any], rows: NDArray[np.int64]) -> NDArray[Any]:
+    """The ascending rows of values [M,...], without a copy where they are all."""
+    return values if len(rows) == len(values) else values[rows]
 
 
 def _joined(first: NDArray[Any], last: NDArray[Any]) -> NDArray[Any]:

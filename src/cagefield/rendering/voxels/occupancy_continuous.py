@@ -9,7 +9,7 @@ Three passes, each where the one before found something: points a brick apart, p
 apart (both against occupied blocks, half a cell added), and the cells of a block against the densities
 themselves. The images of the cells' corners are interpolated between the block's corners, and r is then half
 a cell's reach plus a quarter of the images' second difference, twice the error of interpolation. A coarse
-look is the first pass alone, with points two bricks apart.
+look is the first pass alone, with points two bricks apart where there are more than COARSE_BRICKS.
 """
 
 from __future__ import annotations
@@ -30,6 +30,11 @@ from cagefield.rendering.voxels.occupancy import BRICK, Occupancy, cubes
 from cagefield.typing import Mask
 
 
+COARSE_BRICKS = 1 << 17
+"""Bricks up to which a coarse pass maps the corners of each: in milliseconds, which rays through empty space
+would take several times over."""
+
+
 def near_bricks(
     canonical: Occupancy,
     grid: DeviceGrid,
@@ -42,16 +47,15 @@ def near_bricks(
 ) -> Mask:
     """The bricks [count] with an occupied corner, the first one's at grid coordinates `lower`.
 
-    `coarse` takes eight bricks as one. `starts`, where given, are where the corners are mapped from; see
-    `coarse_corners`.
+    `coarse` takes eight bricks as one where there are many (COARSE_BRICKS). `starts`, where given, are where
+    the corners are mapped from; see `coarse_corners`.
     """
-    if not coarse:
-        points = tuple((count + 1).tolist())
-        images = images_of(grid, stack, lower, np.ones(points, bool), BRICK, starts)
-        return cubes(_occupied(images, canonical, points))
-    points = _coarse_points(count)
-    images = images_of(grid, stack, lower, np.ones(points, bool), 2 * BRICK, starts)
-    near = cubes(_occupied(images, canonical, points, 2.0 * MOST_CELLS))
+    apart = _coarse_spacing(count) if coarse else 1
+    points = _points(count, apart)
+    images = images_of(grid, stack, lower, np.ones(points, bool), apart * BRICK, starts)
+    near = cubes(_occupied(images, canonical, points, apart * MOST_CELLS))
+    if apart == 1:
+        return near
     return near.repeat(2, 0).repeat(2, 1).repeat(2, 2)[: count[0], : count[1], : count[2]]
 
 
@@ -59,11 +63,17 @@ def coarse_corners(
     grid: DeviceGrid, stack: DeviceStack, lower: NDArray[np.int64], count: NDArray[np.int64]
 ) -> NDArray[np.float32]:
     """Images [N,3], grid coordinates, under a stack, of the corners that a coarse pass maps."""
-    return images_of(grid, stack, lower, np.ones(_coarse_points(count), bool), 2 * BRICK)
+    apart = _coarse_spacing(count)
+    return images_of(grid, stack, lower, np.ones(_points(count, apart), bool), apart * BRICK)
 
 
-def _coarse_points(count: NDArray[np.int64]) -> tuple[int, ...]:
-    return tuple((-(-count // 2) + 1).tolist())
+def _coarse_spacing(count: NDArray[np.int64]) -> int:
+    """Bricks between the points of a coarse pass over `count` [3] bricks."""
+    return 1 if count.prod() <= COARSE_BRICKS else 2
+
+
+def _points(count: NDArray[np.int64], apart: int) -> tuple[int, ...]:
+    return tuple((-(-count // apart) + 1).tolist())
 
 
 def occupied_blocks(

@@ -5,7 +5,7 @@ where no edit is discrete, else by `occupancy_discontinuous`. Where one edit of 
 blocks are worked out that its old and its new map can change.
 
 The coarse occupancy, for pictures while a cage is being dragged, is the first pass of these alone, by
-bricks; where no edit jumps, by eight of them at a time.
+bricks; where no edit jumps and there are many, by eight of them at a time.
 """
 
 from __future__ import annotations

@@ -38,8 +38,8 @@ from cagefield.typing import Array, Float32
 if TYPE_CHECKING:
     from cagefield.rendering.renderers import InteractiveRenderer
 
-MAX_STEP_VOXELS = 1.5
-"""Most voxels between samples while something moves; no more than a pixel shows, either."""
+MOVING_STEP_VOXELS = (1.0, 1.5)
+"""Voxels between samples while something moves: least, and most where a pixel shows as much."""
 
 MOVING_QUALITY, REST_QUALITY = 85, 95
 """JPEG qualities."""
@@ -242,7 +242,8 @@ class RendererCache:
             return least
         distance = float(np.linalg.norm(camera.origin - self._middle))
         shown = distance / camera.fx / self.scene.field.sample_spacing
-        return min(max(shown, least), MAX_STEP_VOXELS)
+        low, high = MOVING_STEP_VOXELS
+        return min(max(shown, least, low), high)
 
 
 def _lattice_bytes(edit: Edit) -> int:

@@ -45,3 +45,14 @@ def map_regions(begin, end, points, outer, inner, map_of_inner, images, jacobian
                 images[n, a] = A[0] * x + A[1] * y + A[2] * z + A[3]
                 for b in range(3):
                     jacobian[n, a, b] = A[b]
+
+
+@parallel_njit(lambda rows, *_: len(rows), error_model="numpy", cache=True)
+def put_rows(begin, end, rows, ends, slopes, images, jacobian):
+    """Write the images [M,3] and Jacobians [M,3,3] of some rows into those of all points."""
+    for m in range(begin, end):
+        n = rows[m]
+        for a in range(3):
+            images[n, a] = ends[m, a]
+            for b in range(3):
+                jacobian[n, a, b] = slopes[m, a, b]

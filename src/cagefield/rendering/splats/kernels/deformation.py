@@ -88,6 +88,15 @@ def gather(begin, end, values, rows, out):
             out[m, k] = values[n, k]
 
 
+@parallel_njit(lambda values, rows, out: len(rows), **PLAIN)
+def scatter(begin, end, values, rows, out):
+    """Writes values [M,K] into the rows of out [N,K]; no row occurs twice."""
+    for m in range(begin, end):
+        n = rows[m]
+        for k in range(values.shape[1]):
+            out[n, k] = values[m, k]
+
+
 @njit(**PLAIN)
 def polar_rotation(J, R):
     """Writes R of J = R S, by Newton's method X <- (g X + X^-T / g) / 2 from J; 1 for a singular J.
@@ -127,7 +136,8 @@ def polar_rotation(J, R):
                 value = p * R[i, j] + q * inverse
                 change = max(change, abs(value - R[i, j]))
                 R[i, j] = value
-        if change < 1e-14:
+        # The convergence is quadratic: the next step would change less than the rounding of float64.
+        if change < 1e-8:
             return
 
 
