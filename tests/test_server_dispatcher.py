@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -21,10 +22,12 @@ from cagefield.server.render_queue.dispatcher import (
     TooManyError,
 )
 from cagefield.server.render_queue.requests import Request
+from cagefield.server.render_worker.process import Signals
 from cagefield.server.render_worker.refinement import FINAL
 from cagefield.server.render_worker.tasks import (
     Answered,
     Failed,
+    LightTask,
     PictureDone,
     PictureTask,
     Ready,
@@ -37,7 +40,7 @@ from cagefield.server.render_worker.tasks import (
     WarmStage,
     WarmTask,
 )
-from cagefield.server.render_worker.view import Display
+from cagefield.server.render_worker.view import Display, Region
 
 CAMERA = Camera.look_at((0, -3, 0), (0, 0, 0), width=64, height=64, fov_x=0.8)
 
@@ -51,6 +54,7 @@ class PlayedWorker:
         self.tasks: list[Task] = []
         self.starts = 0
         self.generation = 0
+        self.pauses: list[float] = []
 
     def start(self) -> None:
         self.starts += 1
@@ -60,6 +64,9 @@ class PlayedWorker:
 
     def abandon(self, generation: int) -> None:
         self.generation = generation
+
+    def pause(self, until: float) -> None:
+        self.pauses.append(until)
 
     def close(self) -> None:
         self.tasks.clear()
@@ -341,3 +348,48 @@ def test_downloads_that_nobody_waits_for_are_dropped_and_only_some_wait(
         assert await surely == b"png"
 
     play(source, monkeypatch, script)
+
+
+def test_background_tasks_wait_where_a_drag_is_expected_but_not_for_ever(
+    source: PlayedDispatcher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [100.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+
+    async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
+        def wait() -> None:
+            source.background.append(BackgroundTask(lambda number: LightTask(number, 0), lambda _: None))
+            dispatcher.pump()
+
+        dispatcher.expect_drag()
+        assert worker.pauses == [100.0 + module.PAUSE_SECONDS]
+        wait()
+        assert not worker.tasks
+        # Asked tasks and pictures do not wait.
+        asked = asyncio.ensure_future(dispatcher.ask(surface))
+        await settle()
+        worker.answer(Answered(worker.tasks[0].number, "point"))
+        await settle()
+        assert await asked == "point" and len(worker.tasks) == 1
+        for _ in range(9):  # a mouse that plays with the handles
+            now[0] += 0.4
+            dispatcher.expect_drag()
+        assert worker.pauses[-1] == 100.0 + module.LONGEST_PAUSE < now[0]
+        dispatcher.pump()
+        assert isinstance(worker.tasks[-1], LightTask)
+        now[0] += module.PAUSE_GAP + 10.0
+        dispatcher.expect_drag()
+        assert worker.pauses[-1] == now[0] + module.PAUSE_SECONDS
+
+    play(source, monkeypatch, script)
+
+
+def test_a_paused_task_goes_on_or_stops_at_once() -> None:
+    signals = Signals.shared()
+    signals.paused_until.value = time.monotonic() + 0.05
+    assert not signals.is_over(LightTask(1, 3), 3) and time.monotonic() >= signals.paused_until.value
+    signals.paused_until.value = time.monotonic() + 60.0
+    picture = PictureTask(2, Shown(()), CAMERA, Region(0, 0, 8, 8, 8, 8), Display(), False, FINAL, 3)
+    assert not signals.is_over(picture, 3)
+    signals.generation.value = 4
+    assert signals.is_over(LightTask(1, 3), 3) and signals.is_over(picture, 3)

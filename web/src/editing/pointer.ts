@@ -193,15 +193,17 @@ export class Pointer {
   private updateHover(): void {
     const axis = this.app.gizmo.axis;
     const hover = this.partUnderPointer();
-    if (this.app.gizmo.axis !== axis) this.app.viewport.invalidate();
+    const isOtherAxis = this.app.gizmo.axis !== axis;
+    if (isOtherAxis) this.app.viewport.invalidate();
     const before = this.app.store.now.hover;
-    if (!(
+    const isOtherPart = !(
       hover?.cage === before?.cage &&
       hover?.part.kind === before?.part.kind &&
       hover?.part.index === before?.part.index
-    )) {
-      this.app.store.set({ hover });
-    }
+    );
+    if (isOtherPart) this.app.store.set({ hover });
+    if ((isOtherAxis && this.app.gizmo.axis !== null) || (isOtherPart && hover !== null))
+      this.app.send({ type: "drag_expected" });
     this.app.viewport.canvas.style.cursor = hover || this.app.gizmo.axis !== null ? "pointer" : "";
   }
 

@@ -15,6 +15,7 @@ export type PageMessage =
   | DisplayMessage
   | PresentedMessage
   | Drawing
+  | DragExpected
   | DragBegin
   | DragMove
   | DragEnd
@@ -337,6 +338,12 @@ export interface DragEnd {
     | TwistBy
     | TaperBy
     | MirrorBy;
+}
+/**
+ * The mouse has come to a handle of a cage: background work waits for a moment.
+ */
+export interface DragExpected {
+  type: "drag_expected";
 }
 /**
  * Where the drag is: the whole operation since its beginning.

@@ -29,7 +29,6 @@ from cagefield.rendering.voxels.mapped_lattice import images_of
 from cagefield.rendering.voxels.occupancy import BRICK, Occupancy, cubes
 from cagefield.typing import Mask
 
-
 COARSE_BRICKS = 1 << 17
 """Bricks up to which a coarse pass maps the corners of each: in milliseconds, which rays through empty space
 would take several times over."""

@@ -58,6 +58,15 @@ class Drawing(Message):
     here: DrawnHere
 
 
+class DragExpected(Message):
+    """The mouse has come to a handle of a cage: background work waits for a moment."""
+
+    type: Literal["drag_expected"] = "drag_expected"
+
+    def redundancy_key(self) -> str:
+        return "drag_expected"
+
+
 class DragBegin(Message):
     """A drag of an edit's cages begins."""
 
@@ -328,8 +337,9 @@ class CancelJob(Message):
 
 
 PageMessage: TypeAlias = Annotated[
-    CameraMessage | DisplayMessage | PresentedMessage | Drawing | DragBegin | DragMove | DragEnd | DragCancel
-    | PlayBegin | Play | PlayEnd | Apply | SetCage | Place | PasteScene | FitInner | OuterMargin | Change
+    CameraMessage | DisplayMessage | PresentedMessage | Drawing | DragExpected | DragBegin | DragMove
+    | DragEnd | DragCancel | PlayBegin | Play | PlayEnd | Apply | SetCage | Place | PasteScene | FitInner
+    | OuterMargin | Change
     | SceneChange | Command | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath
     | RenderJob | ExportSplats | ExportPage | CancelJob | SelectionMessage | PointMessage
     | HotspotMessage | AlignmentMessage,

@@ -10,7 +10,8 @@ their 8 corners, corner k = x + 2y + 4z; lattices and edits of control points by
 
 A drag goes: `drag_begin`, any number of `drag` (each states the whole operation since the beginning, so
 the server may skip all but the newest), then `drag_end` or `drag_cancel`. The server answers with `dragged`:
-how much of the operation could be followed, and where the cages then are.
+how much of the operation could be followed, and where the cages then are. A page whose mouse comes to a
+handle may say so before with `drag_expected`.
 
 A page that draws with its own GPU says so with `drawing`. It is then sent the edits, as binary messages of
 their own (see `server_messages.EditsHeader`), in the place of the pictures that it draws.

@@ -43,6 +43,10 @@ _GIVEN_UP = "the renderer ends again and again (out of memory?); save your edits
 REST_SECONDS = 0.3
 """Time without a task that a page or a caller waits for after which a background task may be a long one."""
 
+PAUSE_SECONDS, LONGEST_PAUSE, PAUSE_GAP = 0.6, 3.0, 1.0
+"""Pause of background tasks where a drag is expected, seconds: after the last sign of it, at most, and least
+time until the next one: a mouse that plays with handles does not hold them up."""
+
 PATIENT = 4
 """Tasks that wait until no page does, at most."""
 
@@ -129,6 +133,7 @@ class Dispatcher:
         self._busy = time.monotonic()
         """When a task that somebody waits for was last handed on or done."""
         self._losses: list[float] = []
+        self._pause_began = self._paused_until = float("-inf")
 
     def start(self) -> None:
         """Starts the rendering process; called in the event loop."""
@@ -217,7 +222,8 @@ class Dispatcher:
         running = self._next(now)
         if running is None:
             rest = self._busy + REST_SECONDS - now if self.scheduler.idle() else 0.0
-            waits = [wait for wait in (self.scheduler.wake(now), rest) if wait is not None]
+            pause = self._paused_until - now
+            waits = [wait for wait in (self.scheduler.wake(now), rest, pause) if wait is not None]
             self._sleep(min((wait for wait in waits if wait > 0.0), default=None))
             return
         self._running = running
@@ -228,12 +234,23 @@ class Dispatcher:
         if self._running is not None and self._running.request is None:
             self.scheduler.generation += 1
 
+    def expect_drag(self) -> None:
+        """Pauses background tasks: a mouse is on a handle, and a drag's first picture needs the machine."""
+        now = time.monotonic()
+        if now > self._paused_until + PAUSE_GAP:
+            self._pause_began = now
+        until = min(now + PAUSE_SECONDS, self._pause_began + LONGEST_PAUSE)
+        if until > now:
+            self._paused_until = until
+            self.worker.pause(until)
+            self.pump()
+
     def _next(self, now: float) -> _Running | None:
         awaited = self._awaited(now)
         if awaited is not None:
             self._busy = now
             return awaited
-        if not self.scheduler.idle():
+        if not self.scheduler.idle() or now < self._paused_until:
             return None
         background_task = self._source.background_task(now - self._busy >= REST_SECONDS)
         return (

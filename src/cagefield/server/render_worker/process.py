@@ -15,8 +15,10 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,11 +26,21 @@ from typing import TYPE_CHECKING, Any
 from cagefield.compute.parent_watch import end_with_parent
 from cagefield.errors import CagefieldError, line_of, warnings_in_one_line
 from cagefield.files.temporary_folders import TemporaryFolder
-from cagefield.server.render_worker.tasks import Failed, Ready, Replaced, Result, Task
+from cagefield.server.render_worker.tasks import (
+    BACKGROUND_TASKS,
+    Failed,
+    Ready,
+    Replaced,
+    Result,
+    Task,
+)
 from cagefield.server.render_worker.unused_memory import UnusedMemory
 
 if TYPE_CHECKING:
     from cagefield.scene.scene import Scene
+
+PAUSE_STEP = 0.002
+"""Seconds between two looks of a background task whether its pause is over."""
 
 TO_END = 10.0
 """Seconds that a process that has its scene may take to end: then it keeps the kernels that it compiled."""
@@ -39,10 +51,35 @@ _LOST = (EOFError, OSError)
 """Errors of sending to, and receiving from, a process that has ended."""
 
 
+@dataclass(frozen=True)
+class Signals:
+    """Shared memory by which the server reaches a task that is being done.
+
+    Tasks of generations before `generation` stop at their next look; background tasks wait there until the
+    time `paused_until` (`time.monotonic`).
+    """
+
+    generation: ctypes.c_ulong
+    paused_until: ctypes.c_double
+
+    @classmethod
+    def shared(cls) -> Signals:
+        """Signals in memory that a child process shares."""
+        context = multiprocessing.get_context("spawn")
+        return cls(context.RawValue(ctypes.c_ulong, 0), context.RawValue(ctypes.c_double, 0.0))
+
+    def is_over(self, task: Task, wanted: int) -> bool:
+        """Whether the generation `wanted` of a task is over, after the pause of a background task."""
+        if isinstance(task, BACKGROUND_TASKS):
+            while self.generation.value <= wanted and time.monotonic() < self.paused_until.value:
+                time.sleep(PAUSE_STEP)
+        return self.generation.value > wanted
+
+
 @warnings_in_one_line()
 def serve(
     connection: Connection,
-    generation: ctypes.c_ulong,
+    signals: Signals,
     scene: str,
     device: str,
     files: object = None,
@@ -78,7 +115,7 @@ def serve(
             task = connection.recv()
         except _LOST:
             break
-        going_on = task is not None and _sent(connection, _done(handlers, task, generation))
+        going_on = task is not None and _sent(connection, _done(handlers, task, signals))
     handlers.close()
 
 
@@ -118,9 +155,9 @@ def _sent(connection: Connection, content: Any) -> bool:
     return True
 
 
-def _done(handlers: Any, task: Task, generation: ctypes.c_ulong) -> Result:
+def _done(handlers: Any, task: Task, signals: Signals) -> Result:
     try:
-        return handlers.do(task, lambda wanted: generation.value > wanted)
+        return handlers.do(task, lambda wanted: signals.is_over(task, wanted))
     except CagefieldError as error:
         return Failed(task.number, str(error))
     except OSError as error:
@@ -153,9 +190,8 @@ class Worker:
         """Writes the scene that is edited as another folder."""
         self._device = device
         self._on_result, self._on_lost = on_result, on_lost
-        context = multiprocessing.get_context("spawn")
-        self._context = context
-        self._generation: ctypes.c_ulong = context.RawValue(ctypes.c_ulong, 0)
+        self._context = multiprocessing.get_context("spawn")
+        self._signals = Signals.shared()
         self.process: Any = None
         self._connection: Connection | None = None
         self._has_scene = False
@@ -170,7 +206,7 @@ class Worker:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         process = self._context.Process(
             target=serve,
-            args=(there, self._generation, self.scene, self._device, self.files, self.background),
+            args=(there, self._signals, self.scene, self._device, self.files, self.background),
             daemon=True,
             name="cagefield-renderer",
         )
@@ -193,7 +229,11 @@ class Worker:
 
     def abandon(self, generation: int) -> None:
         """Tasks of older generations stop at their next look."""
-        self._generation.value = generation
+        self._signals.generation.value = generation
+
+    def pause(self, until: float) -> None:
+        """Background tasks wait, at their next look, until a time of `time.monotonic`."""
+        self._signals.paused_until.value = until
 
     @property
     def pid(self) -> int | None:
@@ -204,7 +244,7 @@ class Worker:
         """End the process and abandon its task."""
         connection, self._connection = self._connection, None
         if connection is not None:
-            self._generation.value = ctypes.c_ulong(-1).value
+            self._signals.generation.value = ctypes.c_ulong(-1).value
             _sent(connection, None)
             if self.process is not None and self._has_scene:
                 self.process.join(TO_END)

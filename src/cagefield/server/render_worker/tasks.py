@@ -309,6 +309,9 @@ Task: TypeAlias = (
     | SelectionTask
 )
 
+BACKGROUND_TASKS = (LightTask, ErrorTask, DetoursTask, FrameTask)
+"""Tasks that may wait while a drag is expected: no page shows their results at once."""
+
 
 @dataclass(frozen=True)
 class Ready:

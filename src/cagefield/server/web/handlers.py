@@ -128,6 +128,10 @@ class MessageHandlers:
 
     # ---- drags ----
 
+    @_handles(client_messages.DragExpected)
+    def _drag_expected(self, message: client_messages.DragExpected) -> None:
+        self._coordinator.dispatcher.expect_drag()
+
     @_handles(client_messages.DragBegin)
     def _drag_begin(self, message: client_messages.DragBegin) -> None:
         self._page.drag, self._page.seq = message.drag, 0
