@@ -70,6 +70,8 @@ export class FramePacer {
   /** Number of the first camera message whose frame gives the orbit's center; null once it is known. */
   private orbitFrom: number | null = null;
   private readonly figures: Throttle<Figures>;
+  /** Figures of a drag, which the next redraw shows: a text that changes between two costs a frame of its own. */
+  private nextFigures: Figures | null = null;
 
   constructor(private readonly host: PacerHost) {
     const { viewport, store } = host;
@@ -109,6 +111,10 @@ export class FramePacer {
   /** Requests the next frames while the current redraw goes to the screen. */
   requestNext(): void {
     const { host } = this;
+    if (this.nextFigures !== null && this.figures.isDue) {
+      this.figures.put(this.nextFigures);
+      this.nextFigures = null;
+    }
     const numbers = [...this.undrawn.map(({ header }) => header.picture), ...this.acknowledged];
     if (numbers.length > 0) {
       const waits = host.isDragging() && this.acknowledged.length === 0;
@@ -192,6 +198,7 @@ export class FramePacer {
       final,
       page: header.picture === 0,
     };
-    this.figures.put(figures, final);
+    this.nextFigures = this.host.isDragging() && !final ? figures : null;
+    if (this.nextFigures === null) this.figures.put(figures, final);
   }
 }

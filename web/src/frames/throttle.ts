@@ -8,6 +8,11 @@ export class Throttle<T> {
     private readonly forward: (value: T) => void,
   ) {}
 
+  /** Whether a value would be forwarded at once. */
+  get isDue(): boolean {
+    return performance.now() >= this.lastTime + this.intervalMs;
+  }
+
   /**
    * Forwards a value now if the interval is over or `atOnce`; else at its end, unless a newer value arrives.
    */

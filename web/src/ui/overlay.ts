@@ -10,8 +10,12 @@ import { hasPointTool, isReadOnly } from "../app/store";
 
 const TOAST_STAYS = 7000;
 
-/** Interval of the readout in ms under software rendering, where a change costs half a frame. */
+/**
+ * Under software rendering, where a change of text costs half a frame: least interval of the readout in ms, and the
+ * time after which it is written without a frame that is drawn anyway.
+ */
 const TEXT_EVERY = 150;
+const TEXT_WITHOUT_FRAME = 400;
 
 export function overlay(app: App, pointer: Pointer): HTMLElement {
   const layer = h("div", { class: "overlay" });
@@ -46,19 +50,17 @@ function readout(app: App, pointer: Pointer): HTMLElement {
   const label = h("div", { class: "readout" });
   label.hidden = true;
   let written = -Infinity;
-  let later: ReturnType<typeof setTimeout> | null = null;
-  app.viewport.beforeFrame.push(() => {
+  let later: ReturnType<typeof setTimeout> | undefined;
+  const write = (): void => {
+    clearTimeout(later);
     const { drag } = app;
     const followed = drag === null || drag.ended ? null : drag.followed;
-    const now = performance.now();
-    if (followed !== null && !label.hidden && app.viewport.software && now - written < TEXT_EVERY) {
-      later ??= setTimeout(() => {
-        later = null;
-        app.viewport.invalidate();
-      }, TEXT_EVERY);
+    const isEarly = performance.now() < written + TEXT_EVERY;
+    if (followed !== null && !label.hidden && app.viewport.software && isEarly) {
+      later = setTimeout(write, TEXT_WITHOUT_FRAME);
       return;
     }
-    written = now;
+    written = performance.now();
     label.hidden = followed === null;
     if (drag === null || followed === null) return;
     label.textContent = describeOperation(followed);
@@ -67,7 +69,8 @@ function readout(app: App, pointer: Pointer): HTMLElement {
     const x = Math.min(pointer.position.x + 18, width - label.offsetWidth - 6);
     const y = Math.min(pointer.position.y + 18, height - label.offsetHeight - 6);
     label.style.transform = `translate(${x}px, ${y}px)`;
-  });
+  };
+  app.viewport.beforeFrame.push(write);
   return label;
 }
 
