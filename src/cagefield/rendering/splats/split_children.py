@@ -107,7 +107,8 @@ def _bend(warp: Warp, points: Array, A: Array, proceed: Callable[[], None] | Non
     count = len(points)
     steps = 2.0 * A.transpose(0, 2, 1)  # [M, axis, 3]
     every = np.concatenate([points[:, None], points[:, None] + steps, points[:, None] - steps], axis=1)
-    mapped = to_deformed(warp, every.reshape(-1, 3), proceed=proceed)
+    # The bend over a splat is seen by the long steps of a flow as by short ones, in half of the time.
+    mapped = to_deformed(warp, every.reshape(-1, 3), coarse=True, proceed=proceed)
     F, lost = mapped.points.reshape(count, 7, 3), mapped.lost.reshape(count, 7)
     length = np.linalg.norm(F[:, 1:4] - F[:, 4:7], axis=2)
     second = np.linalg.norm(F[:, 1:4] + F[:, 4:7] - 2.0 * F[:, :1], axis=2)
