@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 
 from cagefield.edits.operations import Operation
@@ -12,6 +13,9 @@ from cagefield.geometry.cage import Cage
 MAX_OPERATIONS = 2000
 """Operations of one edit: 0.1 ms each whenever its cage is computed anew."""
 
+_befores: deque[tuple[Cage, tuple[Operation, ...], Cage]] = deque(maxlen=8)
+"""Cages, operations on them, and the cages that came of these: those before the last operations of edits."""
+
 
 class ImpossibleOperationError(CageError):
     """An operation that makes no cage; `number` counts from 1."""
@@ -21,13 +25,37 @@ class ImpossibleOperationError(CageError):
         self.number = number
 
 
-def cages_along(cage: Cage, operations: Sequence[Operation]) -> Iterator[Cage]:
-    """The cage after each of the operations.
+def cage_before_last(cage: Cage, operations: tuple[Operation, ...]) -> Cage:
+    """The cage before the last of some operations, which a drag does not change: remembered.
+
+    Raises as `cages_along`.
+    """
+    first = operations[:-1]
+    if not first:
+        return cage
+    for start, done, after in tuple(_befores):
+        if start is cage and done == first:
+            return after
+    *_, after = cages_along(cage, first)
+    _befores.append((cage, first, after))
+    return after
+
+
+def cage_after(cage: Cage, operations: tuple[Operation, ...]) -> Cage:
+    """The cage after all of the operations. Raises as `cages_along`."""
+    if not operations:
+        return cage
+    before = cage_before_last(cage, operations)
+    return next(cages_along(before, operations[-1:], len(operations)))
+
+
+def cages_along(cage: Cage, operations: Sequence[Operation], first: int = 1) -> Iterator[Cage]:
+    """The cage after each of the operations, which are numbered from `first`.
 
     Raises:
         ImpossibleOperationError: an operation makes an impossible cage; says how much of it is safe.
     """
-    for number, operation in enumerate(operations, start=1):
+    for number, operation in enumerate(operations, start=first):
         try:
             after = operation.apply(cage)
         except CageError as error:
