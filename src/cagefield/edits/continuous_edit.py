@@ -98,7 +98,7 @@ class ContinuousEdit(AbstractEdit):
             allow_folding=settings.allow_folding,
         )
 
-    @property
+    @cached_property
     def changes_geometry(self) -> bool:
         return self._is_moved
 

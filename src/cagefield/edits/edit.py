@@ -230,7 +230,7 @@ AnyDiscrete = TypeVar("AnyDiscrete", bound=Discrete)
 class Move(Discrete):
     """Edit that shows the content of V^c in V; the rest of V^c is emptied, and filled by `fill`."""
 
-    @property
+    @cached_property
     def changes_geometry(self) -> bool:
         return self._is_moved
 
@@ -239,7 +239,7 @@ class Move(Discrete):
 class Copy(Discrete):
     """Edit that shows the content of V^c in V too; V^c stays."""
 
-    @property
+    @cached_property
     def changes_geometry(self) -> bool:
         return self._is_moved
 

@@ -16,6 +16,9 @@ MAX_OPERATIONS = 2000
 _befores: deque[tuple[Cage, tuple[Operation, ...], Cage]] = deque(maxlen=8)
 """Cages, operations on them, and the cages that came of these: those before the last operations of edits."""
 
+_lasts: deque[tuple[Cage, Operation, Cage]] = deque(maxlen=4)
+"""Cages, an operation on each, and the cages that came of them."""
+
 
 class ImpossibleOperationError(CageError):
     """An operation that makes no cage; `number` counts from 1."""
@@ -23,6 +26,16 @@ class ImpossibleOperationError(CageError):
     def __init__(self, message: str, number: int) -> None:
         super().__init__(message)
         self.number = number
+
+
+def applied(operation: Operation, cage: Cage) -> Cage:
+    """The cage after an operation; the last few are remembered. Raises `CageError`."""
+    for start, done, after in tuple(_lasts):
+        if start is cage and done == operation:
+            return after
+    after = operation.apply(cage)
+    _lasts.append((cage, operation, after))
+    return after
 
 
 def cage_before_last(cage: Cage, operations: tuple[Operation, ...]) -> Cage:
@@ -57,7 +70,7 @@ def cages_along(cage: Cage, operations: Sequence[Operation], first: int = 1) -> 
     """
     for number, operation in enumerate(operations, start=first):
         try:
-            after = operation.apply(cage)
+            after = applied(operation, cage)
         except CageError as error:
             safe = largest_safe(lambda t, c=cage, o=operation: is_valid(o, t, c))  # type: ignore[misc]
             raise ImpossibleOperationError(

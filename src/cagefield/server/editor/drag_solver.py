@@ -13,6 +13,7 @@ from typing import Literal, TypeAlias
 from cagefield.edits import Delete, Edit, Paste
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation, Triple
+from cagefield.edits.operation_sequence import applied, cage_before_last
 from cagefield.edits.operation_shares import share_of
 from cagefield.edits.safe_fraction import SHARE_TOLERANCE, Search, largest_safe
 from cagefield.errors import CagefieldError, EditError
@@ -130,9 +131,10 @@ def _search(is_safe: Callable[[float], bool], operation: Operation, limit: Limit
 def _followed_by(edit: Edit, operation: Operation, t: float = 1.0) -> Edit | None:
     """The edit with the share t of one more operation; None where that makes no cage."""
     try:
-        last = operation if t == 1.0 else operation.part(t)
-        last.apply(edit.deformed)  # the error of an edit takes longer: it says how much would be possible
-        return edit.replace(operations=appended(edit.operations, last))
+        operations = appended(edit.operations, operation if t == 1.0 else operation.part(t))
+        # The error of an edit takes longer: it says how much would be possible.
+        applied(operations[-1], cage_before_last(edit.inner, operations))
+        return edit.replace(operations=operations)
     except CagefieldError:
         return None
 
