@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from random_cages import cages, edits, examples, random_operation, seeds
 
 from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit
@@ -31,6 +30,7 @@ from cagefield.server.protocol.operation_messages import TranslateBy
 from cagefield.server.render_queue.damage import WHOLE, Rect, Showing, screen_bounds, union
 from cagefield.server.web.handlers import MessageHandlers
 from cagefield.warps.cage_motion import Motion
+from random_cages import cages, edits, examples, random_operation, seeds
 
 BOX = Cage.box((0, 0, 0), 0.5)
 HAND = 0.5, 0.8, 1.0, 1.3, 0.9, 0.4, 1.1
@@ -55,7 +55,9 @@ def test_shares_of_operations_that_go_the_same_way(operation: Operation) -> None
         assert share_of(operation, operation.part(r)) == pytest.approx(r, rel=1e-12)
         assert share_of(operation.part(r), operation) == pytest.approx(1.0 / r, rel=1e-12)
     assert share_of(operation, ops.Shear(xy=0.1)) is None and share_of(ops.Shear(xy=0.1), operation) is None
-    assert share_of(operation, operation.part(0.0)) is None and share_of(operation.part(0.0), operation) is None
+    assert (
+        share_of(operation, operation.part(0.0)) is None and share_of(operation.part(0.0), operation) is None
+    )
 
 
 def test_operations_that_go_another_way_have_no_share() -> None:
@@ -211,9 +213,7 @@ def test_differences_of_a_base_are_asked_for_once() -> None:
 
 
 def test_a_picture_of_a_drag_is_asked_for_before_the_answer_and_the_rest() -> None:
-    session = Session(
-        Document.from_edits([Edit.move(BOX, name="a")]), np.array([[-1.0] * 3, [1.0] * 3]), 0.1
-    )
+    session = Session(Document.from_edits([Edit.move(BOX, name="a")]), np.array([[-1.0] * 3, [1.0] * 3]), 0.1)
     events: list[str] = []
     queue = SimpleNamespace(put=lambda message: events.append(type(message).__name__))
     page: Any = SimpleNamespace(number=1, drag=0, seq=0, lost_drag=0, send_queue=queue)

@@ -20,7 +20,7 @@ from cagefield.edits.operation_sequence import (
 )
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import DEFAULT_FEATHER_VOXELS, Fill, Relight, problem_of_infill
-from cagefield.edits.safe_fraction import Search
+from cagefield.edits.safe_fraction import NOTHING_KNOWN, Search
 from cagefield.edits.shells import ShellSettings
 from cagefield.edits.transformable import Transformable
 from cagefield.errors import EditError
@@ -212,7 +212,7 @@ class AbstractEdit(Transformable):
         """The box [2,3] that holds `boxes`; (inf, -inf) for an edit that changes nothing."""
         return bounds_of(self.boxes)
 
-    def safe_fraction(self, operation: Operation | None = None, search: Search = Search()) -> float:
+    def safe_fraction(self, operation: Operation | None = None, search: Search = NOTHING_KNOWN) -> float:
         """Largest t in [0,1], to 1e-3, at which the share t of an operation can follow this edit.
 
         1.0 where the whole operation is safe; otherwise everything from 0 to t is. The default is the last

@@ -9,6 +9,7 @@ import numpy as np
 from cagefield.edits.operations import Bend, Mirror, Operation, Rotate, Scale, Shear, Taper, Twist
 from cagefield.typing import Array
 
+
 def share_of(operation: Operation, other: Operation) -> float | None:
     """r > 0 such that `operation.part(r)` is the other operation, but for rounding; above 1 for a longer one.
 

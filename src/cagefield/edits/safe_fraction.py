@@ -38,6 +38,10 @@ class Search:
         return self.unsafe - self.safe <= SHARE_TOLERANCE * (1.0 + 1e-9)
 
 
+NOTHING_KNOWN = Search()
+"""Search of which nothing is known."""
+
+
 def along(operation: Operation, cage: Cage, t: Array) -> Array:
     """Corners [T,8,3] of the cage after the shares t [T] of an operation, as `operation.part` makes them.
 
@@ -93,7 +97,7 @@ def largest_of(safe: Callable[[Array], Mask], tolerance: float = SHARE_TOLERANCE
         t = np.linspace(low, high, min(SHARES_PER_ROUND, int(np.ceil((high - low) / tolerance))) + 1)[1:]
 
 
-def largest_safe(safe: Callable[[float], bool], search: Search = Search()) -> float:
+def largest_safe(safe: Callable[[float], bool], search: Search = NOTHING_KNOWN) -> float:
     """Largest t in [0,1], to 1e-3, such that everything from 0 to t is safe; 1.0 where safe(1).
 
     Goes up in sixteenths to the first that is not safe and bisects in front of it.

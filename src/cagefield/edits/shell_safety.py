@@ -10,7 +10,7 @@ import numpy as np
 
 from cagefield.edits.operation_sequence import cages_along
 from cagefield.edits.operations import Operation
-from cagefield.edits.safe_fraction import Search, flow_reach, format_share, largest_safe
+from cagefield.edits.safe_fraction import NOTHING_KNOWN, Search, flow_reach, format_share, largest_safe
 from cagefield.edits.shells import Flow, ShellKind
 from cagefield.errors import CageError
 from cagefield.geometry.cage import Cage
@@ -39,7 +39,7 @@ class ShellSafety:
     build: Callable[[Cage], Shell]
     allow_folding: bool = False
 
-    def largest_share(self, operation: Operation, cage: Cage, search: Search = Search()) -> float:
+    def largest_share(self, operation: Operation, cage: Cage, search: Search = NOTHING_KNOWN) -> float:
         """Largest safe share in [0,1] of an operation on the inner cage when that is at `cage`."""
 
         def own_check(t: float) -> bool:

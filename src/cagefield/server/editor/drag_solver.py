@@ -12,9 +12,9 @@ from typing import Literal, TypeAlias
 
 from cagefield.edits import Delete, Edit, Paste
 from cagefield.edits import operations as ops
-from cagefield.edits.operations import Operation, Triple
 from cagefield.edits.operation_sequence import applied, cage_before_last
 from cagefield.edits.operation_shares import share_of
+from cagefield.edits.operations import Operation, Triple
 from cagefield.edits.safe_fraction import SHARE_TOLERANCE, Search, largest_safe
 from cagefield.errors import CagefieldError, EditError
 from cagefield.geometry.cage import EDGES, FACES, Cage

@@ -37,7 +37,7 @@ class PatchExtent:
     def boxes(self, edit: Edit) -> Array:
         """Boxes [B,2,3] (min, max) in deformed space outside which the edit, patched, changes nothing.
 
-        Those of the edits that were asked about last are remembered.
+        Remembered for the edits that were asked about last.
         """
         found = self._known.get(edit)
         return self._known.put(edit, self._boxes(edit)) if found is None else found
