@@ -12,9 +12,15 @@ import numpy as np
 
 from cagefield.edits.edit_names import problem_of_name, problem_of_parent
 from cagefield.edits.grade import GRADE_FIELDS, NEUTRAL_GRADE, Grade
-from cagefield.edits.operation_sequence import ImpossibleOperationError, cages_along, problem_of_count
+from cagefield.edits.operation_sequence import (
+    ImpossibleOperationError,
+    cage_after,
+    cage_before_last,
+    problem_of_count,
+)
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import DEFAULT_FEATHER_VOXELS, Fill, Relight, problem_of_infill
+from cagefield.edits.safe_fraction import NOTHING_KNOWN, Search
 from cagefield.edits.shells import ShellSettings
 from cagefield.edits.transformable import Transformable
 from cagefield.errors import EditError
@@ -76,13 +82,10 @@ class AbstractEdit(Transformable):
     @cached_property
     def deformed(self) -> Cage:
         """The inner cage after all operations."""
-        cage = self.inner
         try:
-            for cage in cages_along(self.inner, self.operations):  # noqa: B007
-                pass
+            return cage_after(self.inner, self.operations)
         except ImpossibleOperationError as error:
             raise ImpossibleEditError(str(self.error(str(error))), error.number) from None
-        return cage
 
     def then(self: AnyEdit, operation: Operation) -> AnyEdit:
         """The edit with one more operation."""
@@ -170,7 +173,7 @@ class AbstractEdit(Transformable):
         """The edit evaluated exactly; a discrete edit as it is."""
 
     @abstractmethod
-    def largest_share(self, operation: Operation, cage: Cage) -> float:
+    def largest_share(self, operation: Operation, cage: Cage, search: Search) -> float:
         """Largest safe share in [0,1] of an operation on the inner cage when that is at `cage`."""
 
     # ---- shared ----
@@ -209,18 +212,19 @@ class AbstractEdit(Transformable):
         """The box [2,3] that holds `boxes`; (inf, -inf) for an edit that changes nothing."""
         return bounds_of(self.boxes)
 
-    def safe_fraction(self, operation: Operation | None = None) -> float:
+    def safe_fraction(self, operation: Operation | None = None, search: Search = NOTHING_KNOWN) -> float:
         """Largest t in [0,1], to 1e-3, at which the share t of an operation can follow this edit.
 
         1.0 where the whole operation is safe; otherwise everything from 0 to t is. The default is the last
-        operation. A discrete edit is limited only by its cage turning inside out.
+        operation. A discrete edit is limited only by its cage turning inside out. `search` has what is known
+        before.
         """
         if operation is not None:
-            return self.largest_share(operation, self.deformed)
+            return self.largest_share(operation, self.deformed, search)
         if not self.operations:
             return 1.0
-        *_, before, _ = (self.inner, *cages_along(self.inner, self.operations))
-        return self.largest_share(self.operations[-1], before)
+        before = cage_before_last(self.inner, self.operations)
+        return self.largest_share(self.operations[-1], before, search)
 
     def error(self, message: str) -> EditError:
         """An error that names the edit."""

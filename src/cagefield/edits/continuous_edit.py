@@ -17,6 +17,7 @@ from cagefield.edits.lattice_distance import lattice_distance
 from cagefield.edits.mirror import Mirror
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattice
+from cagefield.edits.safe_fraction import Search
 from cagefield.edits.shell_safety import ShellSafety
 from cagefield.edits.shells import SMOOTH_FLOW, ShellKind, ShellSettings
 from cagefield.errors import DeviceError
@@ -97,7 +98,7 @@ class ContinuousEdit(AbstractEdit):
             allow_folding=settings.allow_folding,
         )
 
-    @property
+    @cached_property
     def changes_geometry(self) -> bool:
         return self._is_moved
 
@@ -184,9 +185,9 @@ class ContinuousEdit(AbstractEdit):
             message, cure = self._safety.fault(self.deformed)
             raise self.error(message + self._safety.safe_part(self.operations) + cure)
 
-    @property
+    @cached_property
     def is_possible(self) -> bool:
-        return self._safety.is_safe(self.inner) and self._safety.is_safe(self.deformed)
+        return self._safety.is_safe_at_rest and self._safety.is_safe(self.deformed)
 
     def without_lattice(self: AnyContinuous) -> AnyContinuous:
         return self.replace(lattice=None)
@@ -211,8 +212,8 @@ class ContinuousEdit(AbstractEdit):
         lattice = self.replace(lattice=nodes)._kernel_lattice
         return lattice_distance(warp, lattice, samples, proceed)
 
-    def largest_share(self, operation: Operation, cage: Cage) -> float:
-        return self._safety.largest_share(operation, cage)
+    def largest_share(self, operation: Operation, cage: Cage, search: Search) -> float:
+        return self._safety.largest_share(operation, cage, search)
 
     def _shell(self, deformed: Cage) -> Shell:
         if deformed is self.deformed:

@@ -18,7 +18,7 @@ from cagefield.edits.edit_names import problem_of_source
 from cagefield.edits.mirror import mirrored_axes
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattice
-from cagefield.edits.safe_fraction import is_valid, largest_safe
+from cagefield.edits.safe_fraction import Search, is_valid, largest_safe
 from cagefield.edits.shells import (
     NO_SHELL,
     SMOOTH_FLOW,
@@ -219,8 +219,8 @@ class Discrete(Edit, ABC):
     def without_lattice(self: AnyDiscrete) -> AnyDiscrete:
         return self
 
-    def largest_share(self, operation: Operation, cage: Cage) -> float:
-        return largest_safe(lambda t: is_valid(operation, t, cage))
+    def largest_share(self, operation: Operation, cage: Cage, search: Search) -> float:
+        return largest_safe(search.check or (lambda t: is_valid(operation, t, cage)), search)
 
 
 AnyDiscrete = TypeVar("AnyDiscrete", bound=Discrete)
@@ -230,7 +230,7 @@ AnyDiscrete = TypeVar("AnyDiscrete", bound=Discrete)
 class Move(Discrete):
     """Edit that shows the content of V^c in V; the rest of V^c is emptied, and filled by `fill`."""
 
-    @property
+    @cached_property
     def changes_geometry(self) -> bool:
         return self._is_moved
 
@@ -239,7 +239,7 @@ class Move(Discrete):
 class Copy(Discrete):
     """Edit that shows the content of V^c in V too; V^c stays."""
 
-    @property
+    @cached_property
     def changes_geometry(self) -> bool:
         return self._is_moved
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -14,8 +15,31 @@ from cagefield.geometry.cage_checks import factors
 from cagefield.typing import Array, Mask
 from cagefield.warps import FlowShell
 
-SHARES_PER_ROUND = 16
+SHARES_PER_ROUND = 32
 SHARE_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class Search:
+    """Knowledge before a search for the largest safe share of an operation.
+
+    - check: whether a share in [0,1] is safe; None for the check of whom is asked.
+    - safe: share from 0 up to which everything is safe.
+    - unsafe: share that is not safe; above 1 where none is known.
+    """
+
+    check: Callable[[float], bool] | None = None
+    safe: float = 0.0
+    unsafe: float = np.inf
+
+    @property
+    def is_over(self) -> bool:
+        """True where the limit is known to the tolerance."""
+        return self.unsafe - self.safe <= SHARE_TOLERANCE * (1.0 + 1e-9)
+
+
+NOTHING_KNOWN = Search()
+"""Search of which nothing is known."""
 
 
 def along(operation: Operation, cage: Cage, t: Array) -> Array:
@@ -56,33 +80,41 @@ def flow_reach(operation: Operation, cage: Cage, edit: tuple[Cage, Cage], *, fin
 def largest_of(safe: Callable[[Array], Mask], tolerance: float = SHARE_TOLERANCE) -> float:
     """Largest t in [0,1], to the tolerance, such that everything from 0 to t is safe.
 
-    `safe` is asked for sixteenths of the range, then for parts of the one in which it first is not.
+    `safe` is asked for equal parts of the range, then for parts of the one in which it first is not.
     """
     low, high = 0.0, 1.0
-    if not safe(np.zeros(1))[0]:
-        return 0.0
-    while high - low > tolerance:
-        t = np.linspace(low, high, min(SHARES_PER_ROUND, int(np.ceil((high - low) / tolerance))) + 1)
-        mask = safe(t[1:])
+    t = np.linspace(low, high, SHARES_PER_ROUND + 1)
+    while True:
+        mask = safe(t)
         if mask.all():
             return high
         first = int(np.argmin(mask))
-        low, high = float(t[first]), float(t[first + 1])
-    return low
+        if t[first] == 0.0:
+            return 0.0
+        low, high = float(t[first - 1]) if first else low, float(t[first])
+        if high - low <= tolerance:
+            return low
+        t = np.linspace(low, high, min(SHARES_PER_ROUND, int(np.ceil((high - low) / tolerance))) + 1)[1:]
 
 
-def largest_safe(safe: Callable[[float], bool], tolerance: float = 1e-3) -> float:
-    """Largest t in [0,1], to the tolerance, such that everything from 0 to t is safe; 1.0 where safe(1).
+def largest_safe(safe: Callable[[float], bool], search: Search = NOTHING_KNOWN) -> float:
+    """Largest t in [0,1], to 1e-3, such that everything from 0 to t is safe; 1.0 where safe(1).
 
     Goes up in sixteenths to the first that is not safe and bisects in front of it.
     """
-    if safe(1.0):
+    if search.unsafe > 1.0 and safe(1.0):
         return 1.0
-    if not safe(0.0):
-        return 0.0
-    high = next((n / 16.0 for n in range(1, 17) if not safe(n / 16.0)), 1.0)
-    low = high - 1.0 / 16.0
-    while high - low > tolerance:
+    low, high = search.safe, min(search.unsafe, 1.0)
+    if not safe(low):
+        if low == 0.0:
+            return 0.0
+        low = 0.0
+    for t in (n / 16.0 for n in range(1, 16) if low < n / 16.0 < high):
+        if not safe(t):
+            high = t
+            break
+        low = t
+    while high - low > SHARE_TOLERANCE:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if safe(middle) else (low, middle)
     return low

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from cagefield.edits.operation_sequence import cages_along
 from cagefield.edits.operations import Operation
-from cagefield.edits.safe_fraction import flow_reach, format_share, largest_safe
+from cagefield.edits.safe_fraction import NOTHING_KNOWN, Search, flow_reach, format_share, largest_safe
 from cagefield.edits.shells import Flow, ShellKind
 from cagefield.errors import CageError
 from cagefield.geometry.cage import Cage
@@ -38,23 +39,26 @@ class ShellSafety:
     build: Callable[[Cage], Shell]
     allow_folding: bool = False
 
-    def largest_share(self, operation: Operation, cage: Cage) -> float:
+    def largest_share(self, operation: Operation, cage: Cage, search: Search = NOTHING_KNOWN) -> float:
         """Largest safe share in [0,1] of an operation on the inner cage when that is at `cage`."""
 
-        def is_safe(t: float) -> bool:
+        def own_check(t: float) -> bool:
             try:
                 return self.is_safe(operation.part(t).apply(cage))
             except CageError:
                 return False
 
+        is_safe = search.check or own_check
+        if search.is_over and is_safe(search.safe):
+            return search.safe
         if isinstance(self.kind, Flow) and self.inner.is_hexahedron:
-            if is_safe(1.0):
+            if search.unsafe > 1.0 and is_safe(1.0):
                 return 1.0
-            for fine in (False, True):
+            for fine in (False,) if self.outer.is_affine else (False, True):
                 reach = flow_reach(operation, cage, (self.inner, self.outer), fine=fine)
                 if reach < 1.0 and is_safe(reach):
                     return reach
-        return largest_safe(is_safe)
+        return largest_safe(is_safe, search)
 
     def safe_part(self, operations: Sequence[Operation]) -> str:
         """Clause with the safe share of the operation after which the edit never recovered."""
@@ -67,6 +71,11 @@ class ShellSafety:
                 share = format_share(self.largest_share(operation, cages[number - 1]))
                 return f"; {share} of this {operation.noun} (operation {number}, {operation}) is safe"
         return ""
+
+    @property
+    def is_safe_at_rest(self) -> bool:
+        """`is_safe` before all operations; remembered for equal cages."""
+        return _is_safe_at_rest(self.kind, self.inner, self.outer, self.allow_folding)
 
     def is_safe(self, deformed: Cage) -> bool:
         """True where the edit can be evaluated with its inner cage at `deformed`."""
@@ -107,3 +116,9 @@ class ShellSafety:
             f"the {self.kind.name} shell {self.build(deformed).problem()}",
             "" if deformed is self.inner else cure,
         )
+
+
+@lru_cache(maxsize=64)
+def _is_safe_at_rest(kind: ShellKind, inner: Cage, outer: Cage, allow_folding: bool) -> bool:
+    build = lambda deformed: kind.build(inner, deformed, outer)  # noqa: E731
+    return ShellSafety(inner, outer, kind, build, allow_folding).is_safe(inner)

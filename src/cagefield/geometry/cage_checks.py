@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -131,9 +132,25 @@ def _orientation(corners: Array) -> tuple[Array, Array]:
     return hexahedron_determinant.determinant_coefficients(corners), lengths.reshape(-1, 3, 4).mean(axis=2)
 
 
+def _is_nearly_a_box(corners: Array) -> bool:
+    """True only of corners [8,3] that `are_valid`, by a bound that takes a tenth of its time.
+
+    With columns A of the Jacobian at the center and K the largest bend, an edge is 2 A within 8 |K|, and the
+    determinant of any three edges, one along each axis, is 8 det A within 8 ((a + 4 K)^3 - a^3), a = max |A|.
+    """
+    C = hexahedron.coefficients(corners)
+    (a, b, c), bends = C[[1, 2, 4]].tolist(), C[[3, 5, 6, 7]]
+    cross = (b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0])
+    det = a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2]
+    size = math.sqrt(max(x * x + y * y + z * z for x, y, z in (a, b, c)))
+    most = size + 4.0 * math.sqrt(3.0) * float(np.abs(bends).max())
+    volume = size * size * size
+    return det > 2.0 * (most * most * most - volume) + 1e-6 * volume
+
+
 def check_orientation(corners: Array) -> None:
     """Raise `CageError` where the Jacobian determinant is not positive over the whole hexahedron."""
-    if are_valid(corners[None])[0]:
+    if _is_nearly_a_box(corners) or are_valid(corners[None])[0]:
         return
     bernstein, lengths = (each[0] for each in _orientation(corners[None]))
     floor = _FLAT * lengths.prod()

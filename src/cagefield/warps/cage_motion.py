@@ -65,6 +65,16 @@ class Motion:
         """True when the cage is a parallelepiped all the way."""
         return self.start.is_affine and self.end.is_affine
 
+    @property
+    def _keeps_its_shape(self) -> bool:
+        """True for a cage that only moves, but for rounding, in an outer cage with parallel faces."""
+        a, b = self.start, self.end
+        return (
+            self.confines.is_affine
+            and bool(np.abs(b.frame - a.frame).max() <= 1e-12 * np.abs(a.frame).max())
+            and bool(np.abs(b.bend - a.bend).max() <= 1e-12)
+        )
+
     @cached_property
     def _linear(self) -> LinearMotion:
         """The way of F."""
@@ -76,6 +86,8 @@ class Motion:
         least = KEPT_GAP * min(self.gaps)
         if least <= 0.0:
             return np.inf
+        if self._keeps_its_shape and least > 1e-6:
+            return 0.0  # a point's distance from a plane is least at an end of its straight way
         at_rest = 1.0 - np.abs(self._at_rest).max(axis=(1, 2)) - least
         if at_rest.min() >= 0.0:
             return 0.0

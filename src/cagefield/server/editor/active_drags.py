@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from cagefield.edits.operations import Operation
 from cagefield.errors import EditError
 from cagefield.server.editor.document import Document, Entry
-from cagefield.server.editor.drag_solver import Moved, Target, move
+from cagefield.server.editor.drag_solver import Limit, Moved, Target, move
 
 DRAG_OVER = "this drag is over: the edit was changed or removed, or the server restarted; begin again"
 """Notice for a page whose drag was given up."""
@@ -21,6 +21,8 @@ class Drag:
     target: Target
     before: Entry
     now: Entry
+    limit: Limit | None = None
+    """The last one that stopped the drag."""
 
 
 class Drags:
@@ -39,8 +41,9 @@ class Drags:
     def move(self, page: int, number: int, operation: Operation) -> Moved:
         """How far the drag could follow its operation since the beginning."""
         drag = self._find(page, number)
-        moved = move(drag.before, drag.target, operation)
-        self._drags[page] = replace(drag, now=replace(drag.before, edit=moved.edit))
+        moved = move(drag.before, drag.target, operation, drag.limit)
+        now = replace(drag.before, edit=moved.edit)
+        self._drags[page] = replace(drag, now=now, limit=moved.limit or drag.limit)
         return moved
 
     def take(self, page: int, number: int) -> Drag:

@@ -6,22 +6,22 @@ the inner cage as it was trained, the outer one, or both about the inner one's p
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 from cagefield.edits import Delete, Edit, Paste
 from cagefield.edits import operations as ops
+from cagefield.edits.operation_sequence import applied, cage_before_last
+from cagefield.edits.operation_shares import share_of
 from cagefield.edits.operations import Operation, Triple
-from cagefield.edits.safe_fraction import largest_safe
+from cagefield.edits.safe_fraction import SHARE_TOLERANCE, Search, largest_safe
 from cagefield.errors import CagefieldError, EditError
 from cagefield.geometry.cage import EDGES, FACES, Cage
 from cagefield.server.editor.document import Entry
 from cagefield.server.editor.pasting import crop_paste, crop_problem
 from cagefield.server.editor.point_edits import check_operation
 from cagefield.server.editor.validity import INSIDE_OUT, cause, problem
-
-_ROUNDING = 1e-3
-"""Share by which a drag stops earlier where operations, added up, are not safe as they were one by one."""
 
 Target: TypeAlias = Literal["field", "inner", "outer", "both"]
 """Target of a drag: "field", the inner cage with the field (Edit mode); the others, cages alone (Set mode).
@@ -30,17 +30,22 @@ Target: TypeAlias = Literal["field", "inner", "outer", "both"]
 """
 
 
+Limit: TypeAlias = tuple[Operation, float]
+
+
 @dataclass(frozen=True)
 class Moved:
     """An edit after the fraction `part` of an operation; `why` names the limit that stopped the rest.
 
-    `problem` is the edit's, as `problem` finds it.
+    `problem` is the edit's, as `problem` finds it. `limit` is an operation and the share of it up to which
+    everything is safe, to `SHARE_TOLERANCE`, where that was searched for.
     """
 
     edit: Edit
     part: float = 1.0
     why: str | None = None
     problem: str | None = None
+    limit: Limit | None = None
 
 
 def move_corners(corners: tuple[int, ...], by: Triple) -> Operation:
@@ -54,8 +59,10 @@ def move_corners(corners: tuple[int, ...], by: Triple) -> Operation:
     return ops.MoveCorners(chosen, by) if face is None else ops.MoveFace(face, by)
 
 
-def move(entry: Entry, target: Target, operation: Operation) -> Moved:
+def move(entry: Entry, target: Target, operation: Operation, limit: Limit | None = None) -> Moved:
     """The entry's edit after as much of an operation as it can follow.
+
+    `limit` is one that a former `move` of the entry and the target found.
 
     Raises EditError for a locked edit, a deleted one, and an outer cage that is not there.
     """
@@ -67,7 +74,7 @@ def move(entry: Entry, target: Target, operation: Operation) -> Moved:
         raise EditError(f'edit "{edit.name}" has no outer cage; give it one with "outer margin"')
     check_operation(outer if target == "outer" and outer is not None else edit.inner, operation)
     if target == "field":
-        return _with_field(edit, operation)
+        return _with_field(edit, operation, limit)
     return _cages_alone(edit, target, operation)
 
 
@@ -92,25 +99,44 @@ def _sum(first: Operation, second: Operation) -> Operation | None:
     return total if total == replace(first, by=total.by) else None
 
 
-def _with_field(edit: Edit, operation: Operation) -> Moved:
+def _with_field(edit: Edit, operation: Operation, limit: Limit | None) -> Moved:
     if isinstance(edit, Delete):
         raise EditError(f'edit "{edit.name}" deletes its cage\'s content; choose move or copy to move it')
+    whole = _followed_by(edit, operation)
+    why = INSIDE_OUT if whole is None else problem(whole)
+    if whole is not None and (why is None or problem(edit) is not None):
+        return Moved(whole, problem=why, limit=limit)
+    tried: dict[float, Edit] = {}
+
+    def is_safe(t: float) -> bool:
+        done = tried.get(t) or _followed_by(edit, operation, t)
+        if done is None or problem(done) is not None:
+            return False
+        tried[t] = done
+        return True
+
+    part = edit.safe_fraction(operation, _search(is_safe, operation, limit))
+    return Moved(tried[part] if part > 0.0 else edit, part, why, limit=(operation, part))
+
+
+def _search(is_safe: Callable[[float], bool], operation: Operation, limit: Limit | None) -> Search:
+    """Search of an operation that is not safe as a whole; a limit on the same way is that of this one."""
+    ratio = None if limit is None else share_of(operation, limit[0])
+    if limit is None or ratio is None:
+        return Search(is_safe, unsafe=1.0)
+    safe = ratio * limit[1]
+    return Search(is_safe, min(safe, 1.0), min(safe + ratio * SHARE_TOLERANCE, 1.0))
+
+
+def _followed_by(edit: Edit, operation: Operation, t: float = 1.0) -> Edit | None:
+    """The edit with the share t of one more operation; None where that makes no cage."""
     try:
-        whole = edit.replace(operations=appended(edit.operations, operation))
+        operations = appended(edit.operations, operation if t == 1.0 else operation.part(t))
+        # The error of an edit takes longer: it says how much would be possible.
+        applied(operations[-1], cage_before_last(edit.inner, operations))
+        return edit.replace(operations=operations)
     except CagefieldError:
-        why = INSIDE_OUT
-    else:
-        found = problem(whole)
-        if found is None or problem(edit) is not None:
-            return Moved(whole, problem=found)
-        why = found
-    part = edit.safe_fraction(operation)
-    while part > 0.0:
-        done = edit.replace(operations=appended(edit.operations, operation.part(part)))
-        if problem(done) is None:
-            return Moved(done, part, why)
-        part -= _ROUNDING
-    return Moved(edit, 0.0, why)
+        return None
 
 
 def _cages_alone(edit: Edit, target: Target, operation: Operation) -> Moved:

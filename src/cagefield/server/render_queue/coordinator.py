@@ -6,6 +6,7 @@ import asyncio
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -98,7 +99,7 @@ class Coordinator:
         self._replaced: str | None = None
         """Notice for new pages that the scene on disk was replaced, or None."""
         self._pages = 0
-        self._shown = self._what_is_shown()
+        self._shown = self.shown()
         self._drawn = session.drawn()
         self._shown_revision = session.revision
         """The revision that `_shown` was taken from."""
@@ -205,15 +206,20 @@ class Coordinator:
         )
 
     def changed(self, but: Page | None = None) -> None:
-        """Publish a changed session: notify the pages, render visible changes, write the autosave."""
+        """Publish a changed session: render visible changes, write the autosave, notify the pages."""
+        self._tell_lost_drags()
+        self.show()
+        self.publish(but)
+
+    def publish(self, but: Page | None = None) -> None:
+        """Write the autosave of a changed session, and notify the pages: what pictures do not wait for."""
         self.store.autosave(self.session)
         if self.store.trouble is not None and self.store.trouble != self._trouble:
             self.notice("warning", self.store.trouble)
         self._trouble = self.store.trouble
-        self._tell_lost_drags()
         if any(page is not but for page in self.pages.values()):
             self.broadcast(self.state(), but)
-        self.pump()
+        self._tell_preview()
 
     def _tell_lost_drags(self) -> None:
         for page in self.pages.values():
@@ -270,11 +276,17 @@ class Coordinator:
 
     def shown(self) -> Shown:
         """Edits and options that images show now."""
-        return self._what_is_shown()
+        session = self.session
+        edits = values_of(session.drawn())
+        return Shown(edits, session.shown.preserve_opacity, session.isolated, session.shown.removed)
 
     def pump(self) -> None:
-        """Dispatch the rendering of visible changes."""
+        """Dispatch the rendering of visible changes, and tell the pages of a preview."""
         self._tell_preview()
+        self.show()
+
+    def show(self) -> None:
+        """Dispatch the rendering of visible changes, and nothing else: pictures come before messages."""
         self._refresh_shown()
         self.dispatcher.scheduler.edits(self._pictures, self.session.moving, time.monotonic())
         self.dispatcher.pump()
@@ -283,7 +295,7 @@ class Coordinator:
         """The task of a picture that the scheduler wants."""
         page, region = self.pages[request.page], request.region
         assert page.camera is not None  # the scheduler asks for pictures of pages with a camera alone
-        camera = page.camera.resized(region.full_width, region.full_height)
+        camera = _resized(page.camera, region.full_width, region.full_height)
         task = PictureTask(
             request.number,
             self._shown,
@@ -353,7 +365,7 @@ class Coordinator:
                     self.broadcast(server_messages.Preview(page=which[0], play=which[1], on=on))
 
     def _refresh_shown(self) -> None:
-        shown = self._what_is_shown()
+        shown = self.shown()
         self._shown_revision = self.session.revision
         if shown != self._shown:
             self._keep_stack()
@@ -376,14 +388,10 @@ class Coordinator:
         self._stacks = {number: stack for number, stack in self._stacks.items() if number in wanted}
         self._stacks[self._pictures] = EditStack(self._drawn), _options_of(self._shown)
 
-    def _what_is_shown(self) -> Shown:
-        session = self.session
-        return Shown(
-            values_of(session.drawn()),
-            session.shown.preserve_opacity,
-            session.isolated,
-            session.shown.removed,
-        )
+
+@lru_cache(maxsize=64)
+def _resized(camera: Camera, width: int, height: int) -> Camera:
+    return camera.resized(width, height)
 
 
 def _options_of(shown: Shown) -> Options:

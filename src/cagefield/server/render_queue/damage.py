@@ -36,6 +36,10 @@ PART_MARGIN_PX = 2.0
 """Margin of a part on each side, pixels: enlarging a coarse image smooths its edge."""
 
 
+_CORNERS = np.array([[k >> 2, k >> 1 & 1, k & 1] for k in range(8)])
+"""[8,3] which of (min, max) each corner of a box has along each axis."""
+
+
 def everywhere(page: int, one: int, another: int) -> Rect | None:
     """The whole picture."""
     return WHOLE
@@ -51,17 +55,16 @@ def union(a: Rect | None, b: Rect | None) -> Rect | None:
 def screen_bounds(camera: Camera, boxes: Array) -> Rect | None:
     """The rectangle in which a camera without distortion sees boxes [B,2,3] (min, max); None for nowhere."""
     found: Rect | None = None
-    for box in boxes:
-        corners = np.array(list(itertools.product(*box.T)))
-        inside = (corners - camera.origin) @ camera.c2w[:3, :3]
-        depth = -inside[:, 2]
-        if (depth <= 0.0).all():
-            continue
-        if depth.min() <= 1e-6 * float(np.abs(inside).max()):
-            return WHOLE
-        x = (camera.cx + camera.fx * inside[:, 0] / depth) / camera.width
-        y = (camera.cy - camera.fy * inside[:, 1] / depth) / camera.height
-        left, top, right, bottom = float(x.min()), float(y.min()), float(x.max()), float(y.max())
+    corners = boxes[:, _CORNERS, [0, 1, 2]] - camera.origin  # [B,8,3]
+    inside = (corners.reshape(-1, 3) @ camera.c2w[:3, :3]).reshape(corners.shape)
+    depth, sizes = -inside[..., 2], np.abs(inside).max(axis=(1, 2))
+    seen = np.flatnonzero((depth > 0.0).any(axis=1))
+    if (depth[seen].min(axis=1) <= 1e-6 * sizes[seen]).any():
+        return WHOLE
+    x = (camera.cx + camera.fx * inside[seen, :, 0] / depth[seen]) / camera.width
+    y = (camera.cy - camera.fy * inside[seen, :, 1] / depth[seen]) / camera.height
+    sides = np.stack([x.min(axis=1), y.min(axis=1), x.max(axis=1), y.max(axis=1)], axis=1)
+    for left, top, right, bottom in sides.tolist():
         if left < 1.0 and right > 0.0 and top < 1.0 and bottom > 0.0:
             found = union(found, (max(left, 0.0), max(top, 0.0), min(right, 1.0), min(bottom, 1.0)))
     return found
@@ -116,6 +119,8 @@ class Showing:
     """Whether the base is as fine as it can be."""
     later: set[int] = field(default_factory=set)
     coarse: Rect | None = None
+    _differences: dict[int, Rect | None] = field(default_factory=dict)
+    """Where the base differs from revisions that were asked about last."""
 
     def wanting(
         self, page: int, view: object, revision: int, differing: Differing, *, exact: bool = False
@@ -127,9 +132,13 @@ class Showing:
         if self.base is None or view != self.view or (exact and not self.exact):
             return WHOLE
         found = self.coarse if exact else None
-        for other in (revision, *self.later):
-            if other != self.base:
-                found = union(found, differing(page, self.base, other))
+        known = self._differences
+        self._differences = {
+            other: known[other] if other in known else differing(page, self.base, other)
+            for other in {revision, *self.later} - {self.base}
+        }
+        for rect in self._differences.values():
+            found = union(found, rect)
         return found
 
     def drawn(
@@ -138,6 +147,7 @@ class Showing:
         """A picture was drawn in an area: the `whole` one, `all_wanting` (the last part of it), or less."""
         if whole:
             self.view, self.base, self.exact, self.later, self.coarse = view, revision, exact, set(), None
+            self._differences = {}
             return
         if view != self.view or self.base is None:
             self.base = None
@@ -145,7 +155,7 @@ class Showing:
         if not exact:
             self.coarse = union(self.coarse, area)
         if all_wanting and exact and self.exact:
-            self.base, self.later, self.coarse = revision, set(), None
+            self.base, self.later, self.coarse, self._differences = revision, set(), None, {}
         elif all_wanting:
             self.later = {revision} - {self.base}
         else:

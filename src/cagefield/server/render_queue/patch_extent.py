@@ -14,7 +14,11 @@ from cagefield.completion.surfaces.splat_voxelization import max_voxel_size
 from cagefield.edits import Continuous, Edit
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
+from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.typing import Array
+
+MAX_KNOWN = 64
+"""Edits whose boxes are remembered: those of drags come and go."""
 
 
 class PatchExtent:
@@ -22,6 +26,7 @@ class PatchExtent:
 
     def __init__(self, field: VoxelField | SplatField) -> None:
         self._field = field
+        self._known: IdentityCache[Edit, Array] = IdentityCache(MAX_KNOWN)
 
     @cached_property
     def _reach(self) -> float:
@@ -30,7 +35,14 @@ class PatchExtent:
         return RADII_DIAGONALS[-1] * float(np.linalg.norm(self._field.bounds[1] - self._field.bounds[0]))
 
     def boxes(self, edit: Edit) -> Array:
-        """Boxes [B,2,3] (min, max) in deformed space outside which the edit, patched, changes nothing."""
+        """Boxes [B,2,3] (min, max) in deformed space outside which the edit, patched, changes nothing.
+
+        Remembered for the edits that were asked about last.
+        """
+        found = self._known.get(edit)
+        return self._known.put(edit, self._boxes(edit)) if found is None else found
+
+    def _boxes(self, edit: Edit) -> Array:
         if not (needs_patch(edit) or needs_relighting(edit)):
             return edit.boxes
         reach = 0.0 if edit.relight == "none" else self._reach

@@ -146,9 +146,10 @@ class MessageHandlers:
             return
         moved = self._session.drag(self._page.number, message.drag, operation_of(message.operation))
         self._page.seq = message.seq
+        self._coordinator.show()
         carriers = self._session.carriers_of(self._page.number)
         self._page.send_queue.put(dragged_of(message.drag, message.seq, moved, carriers))
-        self._coordinator.changed(but=self._page)
+        self._coordinator.publish(but=self._page)
 
     @_handles(client_messages.DragEnd)
     def _drag_end(self, message: client_messages.DragEnd) -> None:
