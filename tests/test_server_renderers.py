@@ -288,6 +288,8 @@ def test_measuring_a_lattice_is_given_up_and_done_again_later(renderers: Rendere
     background = BackgroundWork(session, Any, lambda: measured.append(1), lambda _: None)  # type: ignore[arg-type]
     background.warming, background.light_known = [], True
     background._lit.put(MOVED, True)
+    # Right after a drag another one may follow.
+    assert background.next(0, rested=False) is None
     background_task = background.next(0)
     assert background_task is not None
     background_task.done(stopped)

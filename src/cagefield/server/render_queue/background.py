@@ -67,10 +67,13 @@ class BackgroundWork:
         self._numbers = 0
         self.exports = Exports(session, store, tell, device)
 
-    def next(self, generation: int, expects_edits: bool = False) -> BackgroundTask | None:
+    def next(
+        self, generation: int, expects_edits: bool = False, rested: bool = True
+    ) -> BackgroundTask | None:
         """Next background task, or None; tasks of older generations than `generation` are abandoned.
 
-        `expects_edits` where an edit may follow and there is time to find the light for it.
+        `expects_edits` where an edit may follow and there is time to find the light for it; not `rested`
+        where a user may drag on at once: lattices are measured later.
         """
         wanted = None if self._session.moving else self._session.detours_wanted()
         if wanted is not None:
@@ -83,7 +86,7 @@ class BackgroundWork:
         unlit = self._unlit()
         if unlit:
             return self._light_around(unlit, generation)
-        measured = self._unmeasured()
+        measured = self._unmeasured() if rested else None
         if measured is not None:
             return self._measure(*measured, generation)
         if self._ending:

@@ -344,7 +344,8 @@ class Coordinator:
         """Next background task while no page waits for an image, or None; `rested` for REST_SECONDS."""
         generation = self.dispatcher.scheduler.generation
         may_edit = any(not page.read_only for page in self.pages.values())
-        return self.highlights.next(generation) or self.background.next(generation, rested and may_edit)
+        highlight = self.highlights.next(generation)
+        return highlight or self.background.next(generation, rested and may_edit, rested)
 
     def _numbered_shown(self) -> tuple[int, Shown]:
         """Number of the pictures' revision, and its content."""
