@@ -135,10 +135,14 @@ class MessageHandlers:
     @_handles(client_messages.DragBegin)
     def _drag_begin(self, message: client_messages.DragBegin) -> None:
         self._page.drag, self._page.seq = message.drag, 0
+        before, but = (self._session.selected, self._session.preview), None
         try:
             self._session.drag_begin(self._page.number, message.drag, message.edit, message.target)
+            if before == (message.edit, None):
+                # Nothing is new to this page, whose panels a state would draw again before the first picture.
+                but = self._page
         finally:
-            self._coordinator.changed()
+            self._coordinator.changed(but)
 
     @_handles(client_messages.DragMove)
     def _drag(self, message: client_messages.DragMove) -> None:
