@@ -109,7 +109,7 @@ def marched(
         data.args(to_device(gains.astype(np.float32))),
         grid.args,
         grid.bricks,
-        WorkerArgs(grid.accumulator, grid.record, scratch, grid.workers),
+        WorkerArgs(grid.accumulator, grid.met, grid.record, grid.groups, scratch, grid.workers),
         LossArgs(losses, penalties, sums),
         BatchArgs(step, 0.05, distortion, 0.8, 7, 1, floats((1.0, 1.0, 1.0))),
         no_lists() if lists is None else lists,
@@ -119,7 +119,7 @@ def marched(
     )
     if lists is not None:
         gather_samples(
-            lists, grid.accumulator, grid.vertex_at, grid.slots, ivec3(*grid.resolution), grid.terms
+            lists, grid.accumulator, grid.met, grid.vertex_at, grid.slots, ivec3(*grid.resolution), grid.terms
         )
     squares = sums.to_numpy().astype(np.float64).reshape(rays, 6)[:, 3:]
     return 0.5 * losses.to_numpy().astype(np.float64) + penalties.to_numpy(), squares
@@ -239,7 +239,9 @@ def test_workers_only_split_the_sum(tmp_path):
 
 def reduced(grid: GridState) -> None:
     """Adds the accumulators of all workers up in the first one's."""
-    reduce_workers(grid.accumulator, grid.record, grid.workers, grid.slots, grid.terms)
+    reduce_workers(
+        grid.accumulator, grid.met, grid.record, grid.workers, grid.slots, grid.terms, grid.group
+    )
 
 
 def smoothed(grid: GridState) -> None:
@@ -251,11 +253,13 @@ def smoothed(grid: GridState) -> None:
         grid.vertex_at,
         grid.cell,
         grid.accumulator,
+        grid.met,
         grid.slots,
         ivec3(N, N, N),
         0.3,
         0.2,
         grid.terms,
+        grid.group,
     )
 
 
@@ -268,9 +272,11 @@ def stepped(grid: GridState) -> None:
         grid.weight,
         grid.cell,
         grid.accumulator,
+        grid.met,
         grid.slots,
         StepArgs(0.9, 0.5, 0.25, 0.3, 0.01, 0.05),
         grid.terms,
+        grid.group,
     )
 
 

@@ -63,7 +63,9 @@ class BatchTrainer:
         """
         losses, sums = self._march(grid, patches, exposure.gains, step)
         if grid.workers > 1:
-            reduce_workers(grid.accumulator, grid.record, grid.workers, grid.slots, grid.terms)
+            reduce_workers(
+                grid.accumulator, grid.met, grid.record, grid.workers, grid.slots, grid.terms, grid.group
+            )
         if self._settings.laplacian_reg > 0:
             self._add_laplacian(grid)
         self._update_grid(grid, done)
@@ -89,7 +91,9 @@ class BatchTrainer:
             photos.args(gains),
             cells,
             grid.bricks,
-            WorkerArgs(grid.accumulator, grid.record, self._sample_scratch(workers), workers),
+            WorkerArgs(
+                grid.accumulator, grid.met, grid.record, grid.groups, self._sample_scratch(workers), workers
+            ),
             LossArgs(losses, penalties, sums),
             BatchArgs(
                 step,
@@ -107,7 +111,7 @@ class BatchTrainer:
         )
         if gpu:
             gather_samples(
-                lists, grid.accumulator, grid.vertex_at, grid.slots, ints(grid.resolution), grid.terms
+                lists, grid.accumulator, grid.met, grid.vertex_at, grid.slots, ints(grid.resolution), grid.terms
             )
         return losses, sums
 
@@ -120,11 +124,13 @@ class BatchTrainer:
             grid.vertex_at,
             grid.cell,
             grid.accumulator,
+            grid.met,
             grid.slots,
             ints(grid.resolution),
             self._settings.laplacian_reg,
             self._settings.laplacian_reg,
             grid.terms,
+            grid.group,
         )
 
     def _update_grid(self, grid: GridState, done: float) -> None:
@@ -139,6 +145,7 @@ class BatchTrainer:
             grid.weight,
             grid.cell,
             grid.accumulator,
+            grid.met,
             grid.slots,
             StepArgs(
                 config.curvature_decay,
@@ -149,6 +156,7 @@ class BatchTrainer:
                 self._settings.view_dependence_reg,
             ),
             grid.terms,
+            grid.group,
         )
 
     def _batch_buffers(self, count: int) -> tuple[Any, Any, Any, Any]:
