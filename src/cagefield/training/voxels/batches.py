@@ -42,8 +42,8 @@ LISTED_SAMPLES_PER_RAY = 48
 """Samples of a batch that are listed by cell on a GPU, on average per ray; a listed sample takes 68 bytes."""
 
 LAPLACIAN_INTERVAL_BATCHES = 4
-"""Batches per Laplacian, whose weight is as many times larger: the neighbors of the voxels met take as long to
-read as a third of the march."""
+"""Batches per Laplacian, whose weight is as many times larger: to read the neighbors of the voxels met takes
+half as long as the march (chair, 360^3)."""
 
 
 class BatchTrainer:
@@ -68,7 +68,13 @@ class BatchTrainer:
         losses, sums = self._march(grid, patches, exposure.gains, step)
         if grid.workers > 1:
             reduce_workers(
-                grid.accumulator, grid.met, grid.record, grid.workers, grid.slots, grid.terms, grid.group
+                grid.accumulator,
+                grid.met,
+                grid.record,
+                grid.workers,
+                grid.slots,
+                grid.group_bits,
+                grid.terms,
             )
         if self._settings.laplacian_reg > 0 and step % LAPLACIAN_INTERVAL_BATCHES == 0:
             self._add_laplacian(grid)
@@ -96,13 +102,19 @@ class BatchTrainer:
             cells,
             grid.bricks,
             WorkerArgs(
-                grid.accumulator, grid.met, grid.record, grid.groups, self._sample_scratch(workers), workers
+                grid.accumulator,
+                grid.met,
+                grid.record,
+                grid.groups,
+                grid.group_bits,
+                self._sample_scratch(workers),
+                workers,
             ),
             LossArgs(losses, penalties, sums),
             BatchArgs(
                 step,
                 space.near,
-                config.distortion_reg,
+                self._settings.distortion_reg,
                 space.half_extent,
                 step_number + 1000003 * config.seed,
                 1,
@@ -115,7 +127,14 @@ class BatchTrainer:
         )
         if gpu:
             gather_samples(
-                lists, grid.accumulator, grid.met, grid.vertex_at, grid.slots, ints(grid.resolution), grid.terms
+                lists,
+                grid.accumulator,
+                grid.met,
+                grid.vertex_at,
+                grid.slots,
+                grid.group_bits,
+                ints(grid.resolution),
+                grid.terms,
             )
         return losses, sums
 
@@ -134,8 +153,8 @@ class BatchTrainer:
             ints(grid.resolution),
             weight,
             weight,
+            grid.group_bits,
             grid.terms,
-            grid.group,
         )
 
     def _update_grid(self, grid: GridState, done: float) -> None:
@@ -160,8 +179,8 @@ class BatchTrainer:
                 config.damping,
                 self._settings.view_dependence_reg,
             ),
+            grid.group_bits,
             grid.terms,
-            grid.group,
         )
 
     def _batch_buffers(self, count: int) -> tuple[Any, Any, Any, Any]:

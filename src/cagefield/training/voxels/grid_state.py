@@ -95,7 +95,7 @@ class GridState:
         workers = max(1, min(threads, MAX_ACCUMULATOR_BYTES // record))
         accumulator = qd.ndarray(qd.f32, (workers * (count + 1) * (HEADER_FLOATS + 3 * terms),))
         accumulator.fill(0.0)
-        groups = -(-(count + 1) // group_slots())
+        groups = (count >> group_bits()) + 1
         return cls(
             bounds=bounds,
             resolution=resolution,
@@ -171,14 +171,14 @@ class GridState:
         return self.slots * (HEADER_FLOATS + 3 * self.terms)
 
     @property
-    def group(self) -> int:
-        """Number of consecutive slots that share a flag."""
-        return group_slots()
+    def group_bits(self) -> int:
+        """Binary logarithm of the number of consecutive slots that share a flag of an accumulator."""
+        return group_bits()
 
     @property
     def groups(self) -> int:
         """Number of flags of one accumulator."""
-        return -(-self.slots // self.group)
+        return ((self.slots - 1) >> group_bits()) + 1
 
     def arrays(
         self,
@@ -310,9 +310,9 @@ def _slots(values: NDArray[np.float32], order: NDArray[np.int64]) -> Any:
     return to_device(padded)
 
 
-def group_slots() -> int:
-    """Number of consecutive slots that share a flag of an accumulator."""
-    return 1 if devices.is_gpu() else 1 << GROUP_BITS
+def group_bits() -> int:
+    """GridState.group_bits of the compute device's grids."""
+    return 0 if devices.is_gpu() else GROUP_BITS
 
 
 def cell_sizes(

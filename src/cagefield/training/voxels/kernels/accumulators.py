@@ -16,7 +16,7 @@ HEADER_FLOATS = 4
 """Floats of a record before its color gradients."""
 
 GROUP_BITS = 4
-"""Binary logarithm of the number of consecutive slots that share a flag on a CPU; on a GPU each has its own."""
+"""Binary logarithm of the number of consecutive slots that share a flag on a CPU; on a GPU none do."""
 
 
 @qd.func

@@ -33,11 +33,11 @@ def reduce_workers(
     record: qd.i32,
     workers: qd.i32,
     slots: qd.i32,
+    group_bits: qd.i32,
     K: qd.template(),
-    group: qd.template(),
 ):
     """Add the accumulators of the other workers, and their flags, to the first one's, and empty them."""
-    groups = (slots + group - 1) // group
+    groups = ((slots - 1) >> group_bits) + 1
     qd.loop_config(block_dim=256)
     for part in range(groups):
         stride = qd.static(HEADER_FLOATS + 3 * K)
@@ -45,7 +45,7 @@ def reduce_workers(
             if met[worker * groups + part] > 0:
                 met[worker * groups + part] = qd.u8(0)
                 met[part] = qd.u8(1)
-                for slot in range(qd.max(part * group, 1), qd.min((part + 1) * group, slots)):
+                for slot in range(qd.max(part << group_bits, 1), qd.min((part + 1) << group_bits, slots)):
                     to = slot * stride
                     at = worker * record + to
                     # A ray that meets a slot adds to its color curvature.
@@ -71,8 +71,8 @@ def laplacian(
     resolution: ivec3,
     density_weight: qd.f32,
     color_weight: qd.f32,
+    group_bits: qd.i32,
     K: qd.template(),
-    group: qd.template(),
 ):
     """Add gradient and curvature of weight/2 * sum over stored neighbors (x - x_n)^2 to the batch's slots.
 
@@ -80,9 +80,9 @@ def laplacian(
     The density's weight is multiplied by the squared voxel size: it acts on optical depth per voxel.
     """
     qd.loop_config(block_dim=256)
-    for part in range((slots + group - 1) // group):
+    for part in range(((slots - 1) >> group_bits) + 1):
         if met[part] > 0:
-            for slot in range(qd.max(part * group, 1), qd.min((part + 1) * group, slots)):
+            for slot in range(qd.max(part << group_bits, 1), qd.min((part + 1) << group_bits, slots)):
                 stride = qd.static(HEADER_FLOATS + 3 * K)
                 to = slot * stride
                 if accumulator[to + 2] > 0.0:
@@ -126,7 +126,9 @@ def laplacian(
                     accumulator[to + 2] = accumulator[to + 2] + color_weight * count
                     for j in qd.static(range(3 * K)):
                         a = to + HEADER_FLOATS + j
-                        accumulator[a] = accumulator[a] + color_weight * (count * sh[slot * (3 * K) + j] - s[j])
+                        accumulator[a] = accumulator[a] + color_weight * (
+                            count * sh[slot * (3 * K) + j] - s[j]
+                        )
 
 
 @qd.kernel(fastcache=True)
@@ -140,8 +142,8 @@ def gauss_newton(
     met: U8,
     slots: qd.i32,
     step: StepArgs,
+    group_bits: qd.i32,
     K: qd.template(),
-    group: qd.template(),
 ):
     """Take one diagonal Gauss-Newton step of every slot in the batch, and empty the reduced accumulator.
 
@@ -149,10 +151,10 @@ def gauss_newton(
     weight: [slots] maximum weight since the last pruning. cell: [slots] world-space voxel size h.
     """
     qd.loop_config(block_dim=256)
-    for part in range((slots + group - 1) // group):
+    for part in range(((slots - 1) >> group_bits) + 1):
         if met[part] > 0:
             met[part] = qd.u8(0)
-            for slot in range(qd.max(part * group, 1), qd.min((part + 1) * group, slots)):
+            for slot in range(qd.max(part << group_bits, 1), qd.min((part + 1) << group_bits, slots)):
                 stride = qd.static(HEADER_FLOATS + 3 * K)
                 at = slot * stride
                 h_color = accumulator[at + 2]
@@ -162,7 +164,9 @@ def gauss_newton(
                     state[2 * slot] = s0
                     state[2 * slot + 1] = s1
                     weight[slot] = qd.max(weight[slot], accumulator[at + 3])
-                    change = step.density_rate * accumulator[at] / (s0 + step.damping * cell[slot] * cell[slot])
+                    change = (
+                        step.density_rate * accumulator[at] / (s0 + step.damping * cell[slot] * cell[slot])
+                    )
                     limit = step.max_step / cell[slot]
                     density[slot] = density[slot] - qd.max(qd.min(change, limit), -limit)
                     rate = step.color_rate / (s1 + step.damping)

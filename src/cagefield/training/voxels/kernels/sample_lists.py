@@ -59,6 +59,7 @@ def gather_samples(
     met: U8,
     vertex_at: I32,
     slots: qd.i32,
+    group_bits: qd.i32,
     resolution: ivec3,
     K: qd.template(),
 ):
@@ -99,7 +100,7 @@ def gather_samples(
                         sums[HEADER_FLOATS + 3 * term + a] += basis[term] * pull[a]
                 number = lists.links[number - 1]
         if sums[2] > 0.0:
-            met[slot] = qd.u8(1)
+            met[slot >> group_bits] = qd.u8(1)
             to = slot * (HEADER_FLOATS + 3 * K)
             accumulator[to + 3] = qd.max(accumulator[to + 3], sums[3])
             for a in qd.static(range(HEADER_FLOATS + 3 * K)):

@@ -38,7 +38,7 @@ from cagefield.rendering.voxels.kernels.grid import (
     vec3,
 )
 from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs, look_ahead, safe_inverse, slab
-from cagefield.training.voxels.kernels.accumulators import GROUP_BITS, HEADER_FLOATS, add, add_max
+from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS, add, add_max
 from cagefield.training.voxels.kernels.ray_batches import PatchArgs, PhotoArgs
 from cagefield.training.voxels.kernels.sample_lists import SampleListArgs, note_sample
 
@@ -73,13 +73,16 @@ def spread_slope(
 
 @dataclass(frozen=True, eq=False)
 class WorkerArgs:
-    """Accumulators of `record` floats per worker, their flags (`groups` of them per worker, see
-    `kernels.accumulators`), and scratch for the workers' samples."""
+    """Accumulators of `record` floats per worker, their flags, and scratch for the workers' samples.
+
+    Each worker has `groups` flags, one for 2^group_bits slots; see `kernels.accumulators`.
+    """
 
     accumulator: F32
     met: U8
     record: qd.i32
     groups: qd.i32
+    group_bits: qd.i32
     scratch: F32
     workers: qd.i32
 
@@ -344,10 +347,7 @@ def march_batch(
                         if listed == 0:
                             for k in qd.static(range(8)):
                                 if slots[k] > 0:
-                                    if qd.static(gpu):
-                                        work.met[slots[k]] = qd.u8(1)
-                                    else:
-                                        work.met[first_flag + (slots[k] >> GROUP_BITS)] = qd.u8(1)
+                                    work.met[first_flag + (slots[k] >> work.group_bits)] = qd.u8(1)
                                     to = base + slots[k] * (HEADER_FLOATS + 3 * K)
                                     add(work.accumulator, to, b[k] * gradient, gpu)
                                     add(work.accumulator, to + 1, b[k] * curvature, gpu)
