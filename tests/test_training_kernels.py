@@ -20,6 +20,7 @@ from cagefield.rendering.voxels.kernels.grid import ivec3  # noqa: E402
 from cagefield.training.voxels.grid_state import GridState, cell_sizes  # noqa: E402
 from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS  # noqa: E402
 from cagefield.training.voxels.kernels.gauss_newton_voxels import (  # noqa: E402
+    RecordArgs,
     StepArgs,
     gauss_newton,
     laplacian,
@@ -290,13 +291,10 @@ def smoothed(grid: GridState) -> None:
         grid.index,
         grid.vertex_at,
         grid.cell,
-        grid.accumulator,
-        grid.met,
-        grid.slots,
+        RecordArgs(grid.accumulator, grid.met, grid.slots, grid.group_bits),
         ivec3(N, N, N),
         0.3,
         0.2,
-        grid.group_bits,
         grid.terms,
     )
 
@@ -309,11 +307,8 @@ def stepped(grid: GridState) -> None:
         grid.state,
         grid.weight,
         grid.cell,
-        grid.accumulator,
-        grid.met,
-        grid.slots,
+        RecordArgs(grid.accumulator, grid.met, grid.slots, grid.group_bits),
         StepArgs(0.9, 0.5, 0.25, 0.3, 0.01, 0.05),
-        grid.group_bits,
         grid.terms,
     )
 

@@ -15,6 +15,7 @@ from cagefield.compute.quadrants import qd
 from cagefield.training.voxels.exposure import Exposure
 from cagefield.training.voxels.grid_state import GridState
 from cagefield.training.voxels.kernels.gauss_newton_voxels import (
+    RecordArgs,
     StepArgs,
     gauss_newton,
     laplacian,
@@ -147,13 +148,10 @@ class BatchTrainer:
             grid.index,
             grid.vertex_at,
             grid.cell,
-            grid.accumulator,
-            grid.met,
-            grid.slots,
+            RecordArgs(grid.accumulator, grid.met, grid.slots, grid.group_bits),
             ints(grid.resolution),
             weight,
             weight,
-            grid.group_bits,
             grid.terms,
         )
 
@@ -168,9 +166,7 @@ class BatchTrainer:
             grid.state,
             grid.weight,
             grid.cell,
-            grid.accumulator,
-            grid.met,
-            grid.slots,
+            RecordArgs(grid.accumulator, grid.met, grid.slots, grid.group_bits),
             StepArgs(
                 config.curvature_decay,
                 rate,
@@ -179,7 +175,6 @@ class BatchTrainer:
                 config.damping,
                 self._settings.view_dependence_reg,
             ),
-            grid.group_bits,
             grid.terms,
         )
 

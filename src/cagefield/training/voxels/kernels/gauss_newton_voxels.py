@@ -26,6 +26,16 @@ class StepArgs:
     view_dependence_reg: qd.f32
 
 
+@dataclass(frozen=True, eq=False)
+class RecordArgs:
+    """Accumulator of `slots` records, and its flags, one for 2^group_bits slots: see `accumulators`."""
+
+    accumulator: F32
+    met: U8
+    slots: qd.i32
+    group_bits: qd.i32
+
+
 @qd.kernel(fastcache=True)
 def reduce_workers(
     accumulator: F32,
@@ -65,13 +75,10 @@ def laplacian(
     index: I32,
     vertex_at: I32,
     cell: F32,
-    accumulator: F32,
-    met: U8,
-    slots: qd.i32,
+    records: RecordArgs,
     resolution: ivec3,
     density_weight: qd.f32,
     color_weight: qd.f32,
-    group_bits: qd.i32,
     K: qd.template(),
 ):
     """Add gradient and curvature of weight/2 * sum over stored neighbors (x - x_n)^2 to the batch's slots.
@@ -80,12 +87,13 @@ def laplacian(
     The density's weight is multiplied by the squared voxel size: it acts on optical depth per voxel.
     """
     qd.loop_config(block_dim=256)
-    for part in range(((slots - 1) >> group_bits) + 1):
-        if met[part] > 0:
-            for slot in range(qd.max(part << group_bits, 1), qd.min((part + 1) << group_bits, slots)):
+    for part in range(((records.slots - 1) >> records.group_bits) + 1):
+        if records.met[part] > 0:
+            begin = qd.max(part << records.group_bits, 1)
+            for slot in range(begin, qd.min((part + 1) << records.group_bits, records.slots)):
                 stride = qd.static(HEADER_FLOATS + 3 * K)
                 to = slot * stride
-                if accumulator[to + 2] > 0.0:
+                if records.accumulator[to + 2] > 0.0:
                     at = vertex_at[slot]
                     nyz = resolution.y * resolution.z
                     x = at // nyz
@@ -121,12 +129,12 @@ def laplacian(
                             for j in qd.static(range(3 * K)):
                                 s[j] += sh[other * (3 * K) + j]
                     scaled = density_weight * cell[slot] * cell[slot]
-                    accumulator[to] = accumulator[to] + scaled * (count * density[slot] - d)
-                    accumulator[to + 1] = accumulator[to + 1] + scaled * count
-                    accumulator[to + 2] = accumulator[to + 2] + color_weight * count
+                    records.accumulator[to] = records.accumulator[to] + scaled * (count * density[slot] - d)
+                    records.accumulator[to + 1] = records.accumulator[to + 1] + scaled * count
+                    records.accumulator[to + 2] = records.accumulator[to + 2] + color_weight * count
                     for j in qd.static(range(3 * K)):
                         a = to + HEADER_FLOATS + j
-                        accumulator[a] = accumulator[a] + color_weight * (
+                        records.accumulator[a] = records.accumulator[a] + color_weight * (
                             count * sh[slot * (3 * K) + j] - s[j]
                         )
 
@@ -138,11 +146,8 @@ def gauss_newton(
     state: F32,
     weight: F32,
     cell: F32,
-    accumulator: F32,
-    met: U8,
-    slots: qd.i32,
+    records: RecordArgs,
     step: StepArgs,
-    group_bits: qd.i32,
     K: qd.template(),
 ):
     """Take one diagonal Gauss-Newton step of every slot in the batch, and empty the reduced accumulator.
@@ -151,30 +156,33 @@ def gauss_newton(
     weight: [slots] maximum weight since the last pruning. cell: [slots] world-space voxel size h.
     """
     qd.loop_config(block_dim=256)
-    for part in range(((slots - 1) >> group_bits) + 1):
-        if met[part] > 0:
-            met[part] = qd.u8(0)
-            for slot in range(qd.max(part << group_bits, 1), qd.min((part + 1) << group_bits, slots)):
+    for part in range(((records.slots - 1) >> records.group_bits) + 1):
+        if records.met[part] > 0:
+            records.met[part] = qd.u8(0)
+            begin = qd.max(part << records.group_bits, 1)
+            for slot in range(begin, qd.min((part + 1) << records.group_bits, records.slots)):
                 stride = qd.static(HEADER_FLOATS + 3 * K)
                 at = slot * stride
-                h_color = accumulator[at + 2]
+                h_color = records.accumulator[at + 2]
                 if h_color > 0.0:
-                    s0 = state[2 * slot] * step.decay + accumulator[at + 1]
+                    s0 = state[2 * slot] * step.decay + records.accumulator[at + 1]
                     s1 = state[2 * slot + 1] * step.decay + h_color
                     state[2 * slot] = s0
                     state[2 * slot + 1] = s1
-                    weight[slot] = qd.max(weight[slot], accumulator[at + 3])
+                    weight[slot] = qd.max(weight[slot], records.accumulator[at + 3])
                     change = (
-                        step.density_rate * accumulator[at] / (s0 + step.damping * cell[slot] * cell[slot])
+                        step.density_rate
+                        * records.accumulator[at]
+                        / (s0 + step.damping * cell[slot] * cell[slot])
                     )
                     limit = step.max_step / cell[slot]
                     density[slot] = density[slot] - qd.max(qd.min(change, limit), -limit)
                     rate = step.color_rate / (s1 + step.damping)
                     for j in qd.static(range(3 * K)):
-                        g = accumulator[at + HEADER_FLOATS + j]
+                        g = records.accumulator[at + HEADER_FLOATS + j]
                         c = sh[slot * (3 * K) + j]
                         if qd.static(j >= 3):
                             g += step.view_dependence_reg * h_color * c
                         sh[slot * (3 * K) + j] = c - rate * g
                     for a in qd.static(range(stride)):
-                        accumulator[at + a] = 0.0
+                        records.accumulator[at + a] = 0.0
