@@ -54,7 +54,7 @@ def test_a_checkpoint_of_earlier_option_names_is_continued(
 ) -> None:
     def start() -> Any:
         if kind == "voxels":
-            return VoxelRun(photos, VoxelConfig(steps=4, resolution=16))
+            return VoxelRun(photos, VoxelConfig(steps=4, resolution=16, distortion_reg=0.0))
         return SplatRun(photos, SplatConfig(steps=4, splats=100))
 
     devices.start()

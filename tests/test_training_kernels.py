@@ -20,6 +20,7 @@ from cagefield.rendering.voxels.kernels.grid import ivec3  # noqa: E402
 from cagefield.training.voxels.grid_state import GridState, cell_sizes  # noqa: E402
 from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS  # noqa: E402
 from cagefield.training.voxels.kernels.gauss_newton_voxels import (  # noqa: E402
+    RecordArgs,
     StepArgs,
     gauss_newton,
     laplacian,
@@ -109,7 +110,9 @@ def marched(
         data.args(to_device(gains.astype(np.float32))),
         grid.args,
         grid.bricks,
-        WorkerArgs(grid.accumulator, grid.record, scratch, grid.workers),
+        WorkerArgs(
+            grid.accumulator, grid.met, grid.record, grid.groups, grid.group_bits, scratch, grid.workers
+        ),
         LossArgs(losses, penalties, sums),
         BatchArgs(step, 0.05, distortion, 0.8, 7, 1, floats((1.0, 1.0, 1.0))),
         no_lists() if lists is None else lists,
@@ -119,7 +122,14 @@ def marched(
     )
     if lists is not None:
         gather_samples(
-            lists, grid.accumulator, grid.vertex_at, grid.slots, ivec3(*grid.resolution), grid.terms
+            lists,
+            grid.accumulator,
+            grid.met,
+            grid.vertex_at,
+            grid.slots,
+            grid.group_bits,
+            ivec3(*grid.resolution),
+            grid.terms,
         )
     squares = sums.to_numpy().astype(np.float64).reshape(rays, 6)[:, 3:]
     return 0.5 * losses.to_numpy().astype(np.float64) + penalties.to_numpy(), squares
@@ -237,9 +247,40 @@ def test_workers_only_split_the_sum(tmp_path):
         )
 
 
+@pytest.mark.parametrize("listed", [False, True])
+def test_flags_mark_the_slots_of_a_batch_and_few_others(tmp_path, listed):
+    """A narrow picture: most of the grid is met by no ray."""
+    camera = Camera.look_at((2.0, 0.3, 0.4), (0, 0.2, 0.1), width=SIZE, height=SIZE, fov_x=0.03)
+    data = DevicePhotos.load([FakeView("v", camera, tmp_path / "none.png")])
+    grid = state(0, False, workers=1 if listed else 2)
+    lists = None
+    if listed:
+        heads, links, count = (to_device(np.zeros(n, np.int32)) for n in (N**3, 1000, 1))
+        lists = SampleListArgs(heads, links, to_device(np.zeros(1000 * NOTE_FLOATS, np.float32)), count, 1000)
+    marched(grid, data, np.ones((1, 3)), lists=lists)
+    records = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, -1)
+    flags = grid.met.to_numpy().reshape(grid.workers, -1)
+    group = 1 << grid.group_bits
+    marked = np.repeat(flags > 0, group, axis=1)[:, : grid.slots]
+    with_record = records[..., 2] > 0
+    assert with_record.any()
+    assert marked[with_record].all()
+    # Samples on faces of cells have corners of weight 0.
+    assert marked.sum() <= group * (with_record.sum() + 4)
+    assert marked.sum() < 0.5 * marked.size
+
+
 def reduced(grid: GridState) -> None:
     """Adds the accumulators of all workers up in the first one's."""
-    reduce_workers(grid.accumulator, grid.record, grid.workers, grid.slots, grid.terms)
+    reduce_workers(
+        grid.accumulator,
+        grid.met,
+        grid.record,
+        grid.workers,
+        grid.slots,
+        grid.group_bits,
+        grid.terms,
+    )
 
 
 def smoothed(grid: GridState) -> None:
@@ -250,8 +291,7 @@ def smoothed(grid: GridState) -> None:
         grid.index,
         grid.vertex_at,
         grid.cell,
-        grid.accumulator,
-        grid.slots,
+        RecordArgs(grid.accumulator, grid.met, grid.slots, grid.group_bits),
         ivec3(N, N, N),
         0.3,
         0.2,
@@ -267,8 +307,7 @@ def stepped(grid: GridState) -> None:
         grid.state,
         grid.weight,
         grid.cell,
-        grid.accumulator,
-        grid.slots,
+        RecordArgs(grid.accumulator, grid.met, grid.slots, grid.group_bits),
         StepArgs(0.9, 0.5, 0.25, 0.3, 0.01, 0.05),
         grid.terms,
     )
@@ -284,6 +323,7 @@ def test_a_batch_changes_the_grid_alike_for_any_number_of_workers(tmp_path):
         smoothed(grid)
         stepped(grid)
         assert not grid.accumulator.to_numpy().any()
+        assert not grid.met.to_numpy().any()
         results.append(grid.arrays())
     for other in results[1:]:
         for values, expected in zip(other, results[0], strict=True):

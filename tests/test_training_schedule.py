@@ -57,10 +57,17 @@ def test_a_run_of_given_steps_chooses_the_same_on_every_machine():
 
 
 def test_what_is_named_is_taken():
-    named = VoxelConfig(resolution=90, sh_degree=0, lr=(3.0, 1.0), laplacian_reg=0.0, view_dependence_reg=0.1)
+    named = VoxelConfig(
+        resolution=90,
+        sh_degree=0,
+        lr=(3.0, 1.0),
+        laplacian_reg=0.0,
+        view_dependence_reg=0.1,
+        distortion_reg=0.02,
+    )
     for unbounded in (False, True):
         assert chosen(named, 400, unbounded=unbounded) == VoxelSettings(
-            90, 0, (3.0, 1.0), 0.0, 0.1, BATCH_RAYS
+            90, 0, (3.0, 1.0), 0.0, 0.1, 0.02, BATCH_RAYS
         )
 
 

@@ -24,7 +24,7 @@ from cagefield.rendering.voxels.device_grid import transform_of
 from cagefield.rendering.voxels.kernels.grid import GridArgs
 from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs
 from cagefield.rendering.voxels.layer_slots import brick_order
-from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS
+from cagefield.training.voxels.kernels.accumulators import GROUP_BITS, HEADER_FLOATS
 
 VERTICES_PER_CHUNK, MAX_THREADS = 2**16, 8
 """Vertices per interpolation task, and maximum number of threads for these tasks."""
@@ -40,7 +40,7 @@ class GridState:
     Attributes:
         bounds: [2,3] as in VoxelField. resolution: vertices per axis. vertices: [M] linear indices, by slot.
         contracted: as VoxelField. degree: SH degree.
-        density, sh, state, weight, accumulator, index, codes: device arrays; see
+        density, sh, state, weight, accumulator, met, index, codes: device arrays; see
             `kernels.march`, `kernels.gauss_newton_voxels` and `kernels.accumulators`.
         threads: number of CPU threads available. workers: number of accumulators, at most `threads`.
     """
@@ -57,6 +57,7 @@ class GridState:
     state: Any
     weight: Any
     accumulator: Any
+    met: Any
     index: Any
     codes: Any
     brick_dims: tuple[int, int, int]
@@ -94,6 +95,7 @@ class GridState:
         workers = max(1, min(threads, MAX_ACCUMULATOR_BYTES // record))
         accumulator = qd.ndarray(qd.f32, (workers * (count + 1) * (HEADER_FLOATS + 3 * terms),))
         accumulator.fill(0.0)
+        groups = (count >> group_bits()) + 1
         return cls(
             bounds=bounds,
             resolution=resolution,
@@ -107,6 +109,7 @@ class GridState:
             state=curvatures,
             weight=to_device(np.zeros(count + 1, np.float32)),
             accumulator=accumulator,
+            met=to_device(np.zeros(workers * groups, np.uint8)),
             index=indices,
             codes=to_device(bricks.codes),
             brick_dims=tuple(bricks.codes.shape),
@@ -166,6 +169,16 @@ class GridState:
     def record(self) -> int:
         """Number of floats of one accumulator."""
         return self.slots * (HEADER_FLOATS + 3 * self.terms)
+
+    @property
+    def group_bits(self) -> int:
+        """Binary logarithm of the number of consecutive slots that share a flag of an accumulator."""
+        return group_bits()
+
+    @property
+    def groups(self) -> int:
+        """Number of flags of one accumulator."""
+        return ((self.slots - 1) >> group_bits()) + 1
 
     def arrays(
         self,
@@ -295,6 +308,11 @@ def _slots(values: NDArray[np.float32], order: NDArray[np.int64]) -> Any:
     padded = np.zeros((len(values) + 1, *values.shape[1:]), np.float32)
     np.take(values, order, axis=0, out=padded[1:])
     return to_device(padded)
+
+
+def group_bits() -> int:
+    """GridState.group_bits of the compute device's grids."""
+    return 0 if devices.is_gpu() else GROUP_BITS
 
 
 def cell_sizes(

@@ -48,7 +48,9 @@ class VoxelConfig:
         prune_weight: vertices whose maximum rendering weight stays below this value are removed.
         step_voxels: distance between samples of a ray, in voxels.
         exposure: fit a color gain to each photo; None does so for captures without alpha.
-        distortion_reg: weight of mip-NeRF 360's distortion loss, against floaters.
+        distortion_reg: weight of mip-NeRF 360's distortion loss, which pulls the weights of a ray together:
+            surfaces then look right from directions without photos. None takes 0.3, or 0 for an unbounded
+            capture.
         near: distance within which an unbounded scene is empty around each camera, relative to the cameras'
             median distance to the center.
     """
@@ -69,7 +71,7 @@ class VoxelConfig:
     prune_weight: float = 0.01
     step_voxels: float = 0.7
     exposure: bool | None = None
-    distortion_reg: float = 0.0
+    distortion_reg: float | None = None
     near: float = 0.15
 
     def __post_init__(self) -> None:

@@ -44,6 +44,7 @@ class VoxelSettings:
     lr: tuple[float, float]
     laplacian_reg: float
     view_dependence_reg: float
+    distortion_reg: float
     batch_rays: int
 
 
@@ -53,10 +54,10 @@ def resolve_settings(
     """Resolved options for photos of `sizes` [V,2]; `threads` is the number of CPU threads, None on a GPU."""
     batch = GPU_BATCH_RAYS if threads is None and config.minutes is not None else BATCH_RAYS
     defaults = (
-        VoxelSettings(UNBOUNDED_RESOLUTION, 1, (4.0, 0.4), 1e-3, 2e-2, batch)
+        VoxelSettings(UNBOUNDED_RESOLUTION, 1, (4.0, 0.4), 1e-3, 2e-2, 0.0, batch)
         if unbounded
         else VoxelSettings(
-            bounded_resolution(sizes, expected_rays(config, threads)), 2, (8.0, 2.0), 1e-5, 3e-3, batch
+            bounded_resolution(sizes, expected_rays(config, threads)), 2, (8.0, 2.0), 1e-5, 3e-3, 0.3, batch
         )
     )
     defaults = dataclasses.replace(

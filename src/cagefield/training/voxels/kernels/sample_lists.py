@@ -10,7 +10,7 @@ additions, 248 for SH degree 2, nearly all of a batch's time; samples beyond the
 from dataclasses import dataclass
 
 from cagefield.compute.quadrants import qd
-from cagefield.rendering.voxels.kernels.grid import F32, I32, ivec3, sh_basis, vec3
+from cagefield.rendering.voxels.kernels.grid import F32, I32, U8, ivec3, sh_basis, vec3
 from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS
 
 NOTE_FLOATS = 16
@@ -56,12 +56,14 @@ def note_sample(
 def gather_samples(
     lists: SampleListArgs,
     accumulator: F32,
+    met: U8,
     vertex_at: I32,
     slots: qd.i32,
+    group_bits: qd.i32,
     resolution: ivec3,
     K: qd.template(),
 ):
-    """Add the listed samples to the records of the slots around them, and empty the lists."""
+    """Add the listed samples to the records of the slots around them, set their flags, empty the lists."""
     qd.loop_config(block_dim=128)
     for slot in range(1, slots):
         at = vertex_at[slot]
@@ -98,6 +100,7 @@ def gather_samples(
                         sums[HEADER_FLOATS + 3 * term + a] += basis[term] * pull[a]
                 number = lists.links[number - 1]
         if sums[2] > 0.0:
+            met[slot >> group_bits] = qd.u8(1)
             to = slot * (HEADER_FLOATS + 3 * K)
             accumulator[to + 3] = qd.max(accumulator[to + 3], sums[3])
             for a in qd.static(range(HEADER_FLOATS + 3 * K)):

@@ -26,6 +26,7 @@ from cagefield.compute.block_cyclic import Schedule, scheduled_item, turn_count
 from cagefield.compute.quadrants import qd
 from cagefield.rendering.voxels.kernels.grid import (
     F32,
+    U8,
     GridArgs,
     contract,
     contract_velocity,
@@ -72,10 +73,16 @@ def spread_slope(
 
 @dataclass(frozen=True, eq=False)
 class WorkerArgs:
-    """Accumulators of `record` floats per worker, and scratch for the workers' samples."""
+    """Accumulators of `record` floats per worker, their flags, and scratch for the workers' samples.
+
+    Each worker has `groups` flags, one for 2^group_bits slots; see `kernels.accumulators`.
+    """
 
     accumulator: F32
+    met: U8
     record: qd.i32
+    groups: qd.i32
+    group_bits: qd.i32
     scratch: F32
     workers: qd.i32
 
@@ -133,8 +140,10 @@ def march_batch(
     for turn in range(turn_count(deal)):
         worker = scheduled_item(turn, deal)
         base = 0
+        first_flag = 0
         if qd.static(not gpu):
             base = worker * work.record
+            first_flag = worker * work.groups
         for n in range(per):
             ray = worker * per + n
             if qd.static(gpu):
@@ -338,6 +347,7 @@ def march_batch(
                         if listed == 0:
                             for k in qd.static(range(8)):
                                 if slots[k] > 0:
+                                    work.met[first_flag + (slots[k] >> work.group_bits)] = qd.u8(1)
                                     to = base + slots[k] * (HEADER_FLOATS + 3 * K)
                                     add(work.accumulator, to, b[k] * gradient, gpu)
                                     add(work.accumulator, to + 1, b[k] * curvature, gpu)
