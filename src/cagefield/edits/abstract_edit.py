@@ -216,8 +216,8 @@ class AbstractEdit(Transformable):
         """Largest t in [0,1], to 1e-3, at which the share t of an operation can follow this edit.
 
         1.0 where the whole operation is safe; otherwise everything from 0 to t is. The default is the last
-        operation. A discrete edit is limited only by its cage turning inside out. `search` has what is known
-        before.
+        operation. A discrete edit is limited only by its cage turning inside out. `search` has knowledge
+        from before.
         """
         if operation is not None:
             return self.largest_share(operation, self.deformed, search)

@@ -56,7 +56,7 @@ MIN_RAY_OPACITY = 1e-3
 MIN_CELL_SHARE = 2.0**-20
 """Minimum cell size, relative to the extent of all splats; it bounds cell coordinates."""
 
-PART_SPLATS = 1 << 13
+SPLATS_PER_PART = 1 << 13
 """Number of splats that a thread packs at a time."""
 
 BLOCK_POINTS = 1 << 13
@@ -102,7 +102,7 @@ class PackedSplats:
             layers[part, :3] = axes[np.arange(len(splats)), np.argmin(scales, axis=1)]
             layers[part, 3] = np.sqrt((scales**-2.0).mean(axis=1) / (2.0 * np.pi))
 
-        map_parts(pack, len(visible), PART_SPLATS)
+        map_parts(pack, len(visible), SPLATS_PER_PART)
         return cls(visible, rows, layers, half)
 
 

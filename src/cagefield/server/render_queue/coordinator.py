@@ -212,7 +212,7 @@ class Coordinator:
         self.publish(but)
 
     def publish(self, but: Page | None = None) -> None:
-        """Write the autosave of a changed session, and notify the pages: what pictures do not wait for."""
+        """Write the autosave of a changed session, and notify the pages, after the request of a picture."""
         self.store.autosave(self.session)
         if self.store.trouble is not None and self.store.trouble != self._trouble:
             self.notice("warning", self.store.trouble)
