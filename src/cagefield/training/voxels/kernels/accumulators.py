@@ -6,7 +6,7 @@ accumulator, without atomics, so the sums do not depend on timing; on a GPU all 
 to which vertices add the samples around them (`kernels.sample_lists`), or workers by atomic adds.
 
 A batch meets few of a large grid's slots. Each accumulator has flags, one for each group of consecutive slots
-(spatial neighbors: slots are in brick order), so that all passes after the march read the groups met alone: on
+(spatial neighbors: slots are in brick order), so that passes after the march read the groups met alone: on
 a grid of 2.5 million slots a look at each record takes longer than the march.
 """
 
