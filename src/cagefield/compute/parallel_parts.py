@@ -27,9 +27,17 @@ def map_parts(function: Callable[[slice], Result], rows: int, part: int) -> list
     if threads < 2 or _is_part.get():
         return [function(each) for each in parts]
 
+    errors: list[BaseException] = []
+
     def run(part: slice) -> Result:
         _is_part.set(True)
-        return function(part)
+        if errors:
+            raise errors[0]
+        try:
+            return function(part)
+        except BaseException as error:
+            errors.append(error)
+            raise
 
     pool = ThreadPoolExecutor(threads)
     try:
