@@ -16,9 +16,8 @@ from cagefield.completion.lighting.light_change import LightChange
 from cagefield.completion.surfaces.block_extraction import extract_block, extract_vertices
 from cagefield.completion.surfaces.block_union import (
     VertexRange,
-    embed_block,
     embed_mask,
-    extend_block,
+    extend_blocks,
 )
 from cagefield.completion.surfaces.grid_block import NORMAL_DEVIATION_VERTICES
 from cagefield.completion.surfaces.near_masks import (
@@ -72,17 +71,17 @@ def test_an_extended_block_is_that_of_all_its_vertices(below: EditStack) -> None
     block = extract_block(field, below, np.array([[-0.3, -0.4, -0.3], [0.4, 0.4, 0.2]]))
     whole = extract_block(field, below, np.array([[-0.3, -0.4, -0.3], [0.4, 0.7, 0.6]]))
     source = FieldVertices(field, below)
-    extended = extend_block(block, VertexRange.from_block(whole), source.extract)
+    changed = block.with_density(block.solid, np.zeros(int(block.solid.sum()), np.float32))
+    extended, other = extend_blocks((block, changed), VertexRange.from_block(whole), source.extract)
     assert extended.shape == whole.shape and (extended.low == whole.low).all()
     np.testing.assert_array_equal(extended.density, whole.density)
     np.testing.assert_array_equal(extended.slot >= 0, whole.slot >= 0)
     stored = whole.slot >= 0
     np.testing.assert_array_equal(extended.sh[extended.slot[stored]], whole.sh[whole.slot[stored]])
-    assert extend_block(whole, VertexRange.from_block(block), source.extract) is whole
-    changed = block.with_density(block.solid, np.zeros(int(block.solid.sum()), np.float32))
-    embedded = embed_block(whole, changed)
-    assert int((embedded.density != whole.density).sum()) == int(block.solid.sum())
-    np.testing.assert_array_equal(embed_mask(whole, block, block.solid), embedded.density != whole.density)
+    assert extend_blocks((whole,), VertexRange.from_block(block), source.extract) == [whole]
+    assert int((other.density != whole.density).sum()) == int(block.solid.sum())
+    np.testing.assert_array_equal(other.slot >= 0, whole.slot >= 0)
+    np.testing.assert_array_equal(embed_mask(whole, block, block.solid), other.density != whole.density)
 
 
 def test_morphology_around_a_mask_is_that_of_the_whole_grid() -> None:

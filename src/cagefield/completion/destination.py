@@ -15,7 +15,7 @@ from cagefield.completion.lighting.ambient_occlusion import LightModel
 from cagefield.completion.lighting.light_change import LightChange, apply_light
 from cagefield.completion.removal import Removal
 from cagefield.completion.surfaces.block_extraction import extract_vertices, vertex_range
-from cagefield.completion.surfaces.block_union import VertexRange, embed_block, embed_mask, extend_block
+from cagefield.completion.surfaces.block_union import VertexRange, embed_mask, extend_blocks
 from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.patch_bounds import destination_box
 from cagefield.completion.surfaces.surfels import (
@@ -119,12 +119,10 @@ def place_part(removal: Removal, edit: Discrete, source: BlockSource) -> Destina
     near, region = VertexRange.from_block(removal.before), context.region
     if box is not None:
         near, region = source.vertices(box), _union(region, box, context.voxel)
-    before = extend_block(removal.before, near, source.extract)
-    under, light = removal.under, removal.light
-    if before is not removal.before:
-        under = embed_block(before, under)
-        if light is not None:
-            light = LightChange(embed_mask(before, removal.before, light.mask), light.log_ratio)
+    before, under = extend_blocks((removal.before, removal.under), near, source.extract)
+    light = removal.light
+    if before is not removal.before and light is not None:
+        light = LightChange(embed_mask(before, removal.before, light.mask), light.log_ratio)
     if model is None or light is None:
         return Destination(removal, edit, region, before, under, light, None)
     remaining = concatenate_surfels([removal.remaining, _surfels_beyond(removal, before, near)])

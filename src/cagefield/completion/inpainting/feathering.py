@@ -49,8 +49,11 @@ def feather_rim(
     g = destination.field.grid_coordinates(moved) - destination.low
     is_inside = ((g >= 0.0) & (g <= np.array(destination.shape) - 1.0)).all(axis=1)
     rim[tuple(np.argwhere(rim)[~is_inside].T)] = False
-    jacobian = jacobian[is_inside]
-    density, sh = interpolate_field(destination.to_layer(), moved[is_inside])
+    jacobian, g = jacobian[is_inside], np.floor(g[is_inside]).astype(np.int64)
+    if not len(g):
+        return part
+    around = destination.crop(g.min(axis=0) - 1, g.max(axis=0) + 2)
+    density, sh = interpolate_field(around.to_layer(), moved[is_inside])
     # Keep optical depth: rendering divides the density in V by the stretch.
     density = np.maximum(density, 0.0) * np.cbrt(np.abs(np.linalg.det(jacobian)))
     u, _, v = np.linalg.svd(jacobian)

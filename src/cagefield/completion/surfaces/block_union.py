@@ -6,7 +6,7 @@ grid of A's field, numbers go on: negative ones, and such from the resolution on
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -69,33 +69,32 @@ class VertexRange:
         return VertexRange(first, last)
 
 
-def extend_block(block: GridBlock, vertices: VertexRange, extract: Extract) -> GridBlock:
-    """Block A with all vertices of a range as well; `extract` gives those that A has not."""
-    own = VertexRange.from_block(block)
+def extend_blocks(blocks: Sequence[GridBlock], vertices: VertexRange, extract: Extract) -> list[GridBlock]:
+    """Blocks A of one place with all vertices of a range as well; `extract` gives those that they have not.
+
+    The blocks themselves where they have all.
+    """
+    own = VertexRange.from_block(blocks[0])
     union = own.union(vertices)
     beyond = union.beyond(own)
     if beyond is None:
-        return block
+        return list(blocks)
     added = extract(beyond.first, beyond.shape)
-    shape = tuple(int(n) for n in union.shape)
-    width = block.sh.shape[1:]
-    empty = replace(
-        block,
-        low=union.first,
-        density=np.zeros(shape, np.float32),
-        slot=np.full(shape, -1, np.int64),
-        sh=np.zeros((0, *width), np.float32),
-    )
-    return embed_block(embed_block(empty, added), block)
+    return [_join(union, (added, block)) for block in blocks]
 
 
-def embed_block(block: GridBlock, part: GridBlock) -> GridBlock:
-    """Block with the vertices of a part of it in place of its own."""
-    slices = part_slices(block, part)
-    density, slot = block.density.copy(), block.slot.copy()
-    density[slices] = part.density
-    slot[slices] = np.where(part.slot >= 0, part.slot + len(block.sh), -1)
-    return replace(block, density=density, slot=slot, sh=np.concatenate([block.sh, part.sh]))
+def _join(vertices: VertexRange, parts: Sequence[GridBlock]) -> GridBlock:
+    """Block of a range with the vertices of parts of it, of later ones where they overlap; else empty."""
+    shape = tuple(int(n) for n in vertices.shape)
+    density, slot = np.zeros(shape, np.float32), np.full(shape, -1, np.int64)
+    block = replace(parts[-1], low=vertices.first, density=density, slot=slot)
+    rows = 0
+    for part in parts:
+        slices = part_slices(block, part)
+        density[slices] = part.density
+        slot[slices] = np.where(part.slot >= 0, part.slot + rows, -1)
+        rows += len(part.sh)
+    return replace(block, sh=np.concatenate([part.sh for part in parts]))
 
 
 def embed_mask(block: GridBlock, part: GridBlock, mask: Mask) -> Mask:

@@ -14,6 +14,7 @@ from scipy import ndimage
 
 from cagefield.completion.surfaces.near_masks import close_gaps, fill_cavities, map_slabs, slices_around
 from cagefield.compute.cancellation import check_cancelled
+from cagefield.compute.parallel_parts import map_parts
 from cagefield.fields.contraction import uncontract
 from cagefield.fields.sh import C0, scale_sh_colors
 from cagefield.fields.voxel_field import VoxelField
@@ -24,6 +25,9 @@ MIN_COEFFICIENT_DIFFERENCE = 0.01
 """Minimum visible difference of spherical-harmonics coefficients: at most a hundredth of the range of
 colors.
 """
+
+PART_ROWS = 16_384
+"""Rows of coefficients that one thread computes at a time."""
 
 SOLID_OPTICAL_DEPTH = 0.3
 """Minimum optical depth per voxel of a solid vertex."""
@@ -217,9 +221,13 @@ class GridBlock:
 
     def scale_colors(self, mask: Mask, ratio: Array) -> GridBlock:
         """Block with colors multiplied by `ratio` [N] at the vertices of a mask [X,Y,Z] with slots."""
-        sh = self.sh.copy()
-        rows = self.slot[mask]
-        sh[rows] = scale_sh_colors(sh[rows], np.repeat(ratio[:, None], 3, axis=1))
+        is_scaled = ratio != 1.0
+        sh, rows, gains = self.sh.copy(), self.slot[mask][is_scaled], ratio[is_scaled, None]
+
+        def scale(part: slice) -> None:
+            sh[rows[part]] = scale_sh_colors(sh[rows[part]], np.repeat(gains[part], 3, axis=1))
+
+        map_parts(scale, len(rows), PART_ROWS)
         return self.with_coefficients(sh)
 
     def with_coefficients(self, sh: Float32) -> GridBlock:
@@ -245,10 +253,13 @@ class GridBlock:
         check_cancelled()
         changed = self.density != other.density
         both_colored = (self.slot >= 0) & (other.slot >= 0)
-        difference = np.abs(self.sh[self.slot[both_colored]] - other.sh[other.slot[both_colored]]).max(
-            axis=(1, 2)
-        )
-        changed[both_colored] |= difference > tolerance
+        rows, other_rows = self.slot[both_colored], other.slot[both_colored]
+
+        def differs(part: slice) -> NDArray[np.bool_]:
+            difference = np.abs(self.sh[rows[part]] - other.sh[other_rows[part]])
+            return np.asarray(difference.max(axis=(1, 2)) > tolerance)
+
+        changed[both_colored] |= np.concatenate(map_parts(differs, len(rows), PART_ROWS))
         return np.asarray(changed | ((self.slot >= 0) != (other.slot >= 0)))
 
     def to_layer(self) -> VoxelField:
