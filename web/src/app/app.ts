@@ -72,6 +72,10 @@ const CANVAS_KEYS = [
 /** Tolerance with which lines count as hidden, in voxels. */
 const LINE_SLACK_VOXELS = 1.5;
 
+/** Longest wait of a cage's redraw for the picture of its drag, and the latency of pictures above which none waits. */
+const MAX_LINES_DELAY_MS = 150;
+const MAX_AWAITED_LATENCY_MS = 300;
+
 export class App {
   readonly store = new Store(recallTools());
   readonly viewport: Viewport;
@@ -190,7 +194,18 @@ export class App {
     this.drag.move(operation);
     this.frames.latency.addMove(this.drag.id, this.drag.seq, time);
     this.store.set({ limit: this.drag.why });
-    this.viewport.invalidate();
+    this.redrawLines();
+  }
+
+  /**
+   * Redraws the cage of a drag: at once, or under software rendering with the server's next picture, which a redraw
+   * of its own would delay.
+   */
+  private redrawLines(): void {
+    const { viewport, page, frames } = this;
+    if (viewport.software && !page.draws && frames.latency.lastMove < MAX_AWAITED_LATENCY_MS)
+      viewport.invalidateWithin(MAX_LINES_DELAY_MS);
+    else viewport.invalidate();
   }
 
   endDrag(): void {

@@ -33,6 +33,8 @@ const MAX_RECORDS = 2000;
 export class Latency {
   readonly moves: Move[] = [];
   readonly presented: Presented[] = [];
+  /** Time from the last motion that an image has shown to that image; 0 before the first one. */
+  lastMove = 0;
 
   /** Records a motion of the mouse in a drag. */
   addMove(drag: number, seq: number, time: number): void {
@@ -70,6 +72,7 @@ export class Latency {
     if (picture.drag === 0) return;
     const move = this.moves.find((m) => m.drag === picture.drag && m.seq === picture.seq);
     if (move?.presented !== null) return;
+    this.lastMove = picture.time - move.moved;
     Object.assign(move, {
       received,
       decoded,

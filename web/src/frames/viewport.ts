@@ -65,6 +65,8 @@ export class Viewport {
   orbitGuessed: (() => void)[] = [];
   private sceneCenter: Vec3 = [0, 0, 0];
   private scheduled = false;
+  /** Timer of a redraw that waits for another one. */
+  private deferred: ReturnType<typeof setTimeout> | undefined;
   private size = new Vector2(1, 1);
 
   constructor(private readonly host: HTMLElement) {
@@ -96,6 +98,8 @@ export class Viewport {
   invalidate(): void {
     if (this.scheduled) return;
     this.scheduled = true;
+    clearTimeout(this.deferred);
+    this.deferred = undefined;
     requestAnimationFrame((began) => {
       this.scheduled = false;
       for (const action of this.beforeFrame) action();
@@ -107,6 +111,11 @@ export class Viewport {
         for (const action of this.afterFrame) action(time);
       });
     });
+  }
+
+  /** Schedules a redraw in so many milliseconds, if none comes before. */
+  invalidateWithin(ms: number): void {
+    if (!this.scheduled) this.deferred ??= setTimeout(() => this.invalidate(), ms);
   }
 
   /** Draws the scene into one pixel, which the frame that follows covers: its shaders are compiled then. */

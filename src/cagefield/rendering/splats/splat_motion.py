@@ -29,6 +29,7 @@ from cagefield.edits.mapped_samples import SampleGrade
 from cagefield.edits.patch import SplatPatch
 from cagefield.fields.sh import scale_sh_colors
 from cagefield.fields.splat_field import SplatField
+from cagefield.geometry.cage import Cage
 from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.typing import Array, Mask
 from cagefield.warps.discrete import DiscreteWarp
@@ -42,6 +43,9 @@ KEPT_STACKS = 6
 
 KEPT_SPLATS = 4_000_000
 """Most moved splats that are kept of one set, 104 bytes each; the stack shown last is kept in any case."""
+
+KEPT_PATCHES = 4
+"""Patches of one set whose splats are kept."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +151,7 @@ class MovedSplats:
         from cagefield.rendering.splats.kernels.deformation import changes, in_boxes, times
 
         warp = step.exact_warp
-        reach = np.concatenate([step.boxes, step.edit.inner.aabb[None]])
+        reach = np.concatenate([step.edit.boxes, step.edit.inner.aabb[None]])
         at_rest, elsewhere = np.empty(len(means), bool), np.empty(len(self.source), bool)
         in_boxes(means, reach, at_rest)
         if len(elsewhere):
@@ -198,32 +202,27 @@ class MovedSplats:
 
     def _patched(self, edit: Edit, patch: SplatPatch, splats: SplatSet, carried: Array) -> MovedSplats:
         """These with the patch of the edit that moved them; `carried` [C,3] is where its last rows were."""
-        from cagefield.rendering.splats.kernels.deformation import in_boxes
-
         here = len(self.source) - len(carried)
         gains = np.ones((len(self.source), 3)) if self.gains is None else self.gains.copy()
         if patch.part is not None and len(carried):
             gains[here:] *= np.exp(patch.part.at(carried))[:, None]
         # Splats that the edit leaves: those in their own places, and those that earlier edits took there.
-        means = splats.field.means
-        inside = np.empty(len(means), bool)
-        in_boxes(means, patch.region.aabb[None], inside)
-        still = np.flatnonzero(inside & ~self.left)
-        points = np.concatenate([means[still].astype(np.float64), self.points[:here]])
-        outside = np.ones(len(points), bool) if isinstance(edit, Paste) else ~edit.inner.contains(points)
-        gone = patch.takes_away(points) & outside
-        log = np.where(outside, patch.light.at(points), 0.0)
-        lit = np.flatnonzero((np.abs(log[: len(still)]) > MIN_LOG_GAIN) & ~gone[: len(still)])
-        gains[:here] *= np.exp(log[len(still) :])[:, None]
+        at_rest = _under_patch(splats, patch, edit)
+        is_here = ~self.left[at_rest.rows]
+        still, gone, log = (each[is_here] for each in (at_rest.rows, at_rest.gone, at_rest.log_gains))
+        gone_elsewhere, log_elsewhere = _change_at(patch, edit, self.points[:here])
+        lit = np.flatnonzero((np.abs(log) > MIN_LOG_GAIN) & ~gone)
+        gains[:here] *= np.exp(log_elsewhere)[:, None]
         left = self.left.copy()
-        left[still[gone[: len(still)]]] = True
+        left[still[gone]] = True
         left[still[lit]] = True
         kept = np.ones(len(self.source), bool)
-        kept[:here] = ~gone[len(still) :]
-        turn = np.tile(np.eye(3), (len(lit), 1, 1))
+        kept[:here] = ~gone_elsewhere
+        turn = np.broadcast_to(np.eye(3), (len(lit), 3, 3))
+        places = splats.field.means[still[lit]].astype(np.float64)
         parts = [
             (self.source[kept], self.points[kept], self.jacobian[kept], gains[kept]),
-            (still[lit], points[lit], turn, np.tile(np.exp(log[lit])[:, None], 3)),
+            (still[lit], places, turn, np.tile(np.exp(log[lit])[:, None], 3)),
         ]
         if patch.field is splats.scene:
             parts.append((patch.sources, patch.points, patch.jacobian, patch.gains))
@@ -234,6 +233,49 @@ class MovedSplats:
             fresh = SampleGrade.neutral(len(source) - len(known.density))
             grade = SampleGrade.concatenate([known, fresh])
         return MovedSplats(left, source, points, jacobian, gains, grade)
+
+
+@dataclass(frozen=True, eq=False)
+class _UnderPatch:
+    """Splats of a set in a patch's region: rows [R], mask of those it takes away, log gains of light.
+
+    `inner` is V^c, within which the patch changes nothing; None of a paste.
+    """
+
+    patch: SplatPatch
+    inner: Cage | None
+    rows: NDArray[np.int64]
+    gone: Mask
+    log_gains: Array
+
+
+@memoized_weakly
+def _known_patches(splats: SplatSet) -> list[_UnderPatch]:
+    """Latest results of `_under_patch` for a living set, most recent first."""
+    return []
+
+
+def _under_patch(splats: SplatSet, patch: SplatPatch, edit: Edit) -> _UnderPatch:
+    """Splats of a set, all in their places, under the patch of an edit; kept while its part is dragged."""
+    from cagefield.rendering.splats.kernels.deformation import in_boxes
+
+    known = _known_patches(splats)
+    inner = None if isinstance(edit, Paste) else edit.inner
+    found = next((k for k in known if k.patch is patch and k.inner == inner), None)
+    if found is None:
+        means = splats.field.means
+        inside = np.empty(len(means), bool)
+        in_boxes(means, patch.region.aabb[None], inside)
+        rows = np.flatnonzero(inside)
+        found = _UnderPatch(patch, inner, rows, *_change_at(patch, edit, means[rows].astype(np.float64)))
+    known[:] = [found, *(k for k in known if k is not found)][:KEPT_PATCHES]
+    return found
+
+
+def _change_at(patch: SplatPatch, edit: Edit, points: Array) -> tuple[Mask, Array]:
+    """(splats [N] at points [N,3] that a patch takes away, their log gains of light [N])."""
+    outside = np.ones(len(points), bool) if isinstance(edit, Paste) else ~edit.inner.contains(points)
+    return patch.takes_away(points) & outside, np.where(outside, patch.light.at(points), 0.0)
 
 
 def _rows_of(values: NDArray[Any], rows: NDArray[np.int64]) -> NDArray[Any]:
