@@ -42,7 +42,7 @@ Kind = Literal["continuous", "discrete"]
 
 WINDOW = 1104, 850
 """Width and height of the window; the picture is 1058x782, with the panel closed."""
-DRAGS, MOVES, DRAG_SECONDS, DRAG_PX = 3, 10, 1.5, 40
+DRAGS, DRAG_SECONDS, DRAG_PX = 3, 1.5, 40
 PATIENCE = 300.0
 
 PREPARATION = (
@@ -72,6 +72,8 @@ class EditorLatency:
     scenes: tyro.conf.Positional[list[Path]]
     """Scene folders; they are copied, not changed."""
     repeats: int = 5
+    moves: int = 10
+    """Moves of the mouse in a drag; 90 are those of a mouse that is read 60 times a second."""
     kinds: tuple[Kind, ...] = ("continuous", "discrete")
     empty_cache: bool = False
     """Start each repetition without compiled kernels."""
@@ -119,6 +121,7 @@ class EditorLatency:
             + (" --empty-cache" if self.empty_cache else "")
             + (" --unlit" if self.unlit else "")
             + (f" --pause {self.pause:g}" if self.pause else "")
+            + (f" --moves {self.moves}" if self.moves != EditorLatency.moves else "")
         )
         notes = f"Medians of {self.repeats} fresh editors; longest in brackets. {machine}. `{command}`"
         text = "\n".join(["# Latency of the first drags", "", *lines, "", notes, ""])
@@ -177,9 +180,9 @@ class EditorLatency:
         page.mouse.move(grip["x"], grip["y"])
         page.evaluate(SHOWN)
         page.mouse.down()
-        for n in range(1, MOVES + 1):
-            page.mouse.move(grip["x"], grip["y"] - direction * DRAG_PX * n / MOVES)
-            time.sleep(DRAG_SECONDS / MOVES)
+        for n in range(1, self.moves + 1):
+            page.mouse.move(grip["x"], grip["y"] - direction * DRAG_PX * n / self.moves)
+            time.sleep(DRAG_SECONDS / self.moves)
         let_go = float(page.evaluate("performance.now()"))
         page.mouse.up()
         if self.pictures is not None:

@@ -29,6 +29,7 @@ from cagefield.rendering.splats import split_children
 from cagefield.rendering.splats.bake_splats import baked_splats
 from cagefield.rendering.splats.raster_splats import changed_splats, deformed_splats
 from cagefield.rendering.splats.splat_motion import moved_splats
+from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.rendering.splats.splitting import split_of
 from cagefield.scene.scene import Scene
@@ -60,6 +61,28 @@ def test_a_deleted_box_leaves_a_floor_without_a_hole_or_a_shadow():
     filled = db(seen(field, patched(field, edit, None)), truth)
     relit = db(seen(field, patched(field, edit)), truth)
     assert left < 24.0 and filled > left + 1.5 and relit > left + 9.0
+
+
+def test_a_patch_is_evaluated_once_while_its_part_is_dragged(monkeypatch):
+    field, edit = room(True), Edit.move(cage())
+    first, later = (edit.translate((by, 0.0, 0.0)) for by in (0.1, 0.5))
+    patch = build_splat_patch(field, EditStack(), first, LIGHT, include_destination=False)
+    assert isinstance(patch, SplatPatch)
+    splats, evaluated, at = SplatSet.from_field(field), [], NewLight.at
+
+    def counted(light: NewLight, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        evaluated.append(len(points))
+        return at(light, points)
+
+    monkeypatch.setattr(NewLight, "at", counted)
+    moved_splats(splats, PreparedStack([PreparedEdit(first, patch)]))
+    known = sum(evaluated)
+    moved = moved_splats(splats, PreparedStack([PreparedEdit(later, patch)]))
+    assert sum(evaluated) == known > 100
+    alone = room(True)
+    anew = moved_splats(alone, PreparedStack([PreparedEdit(later, dataclasses.replace(patch, field=alone))]))
+    for name in ("left", "source", "points", "jacobian", "gains"):
+        np.testing.assert_array_equal(getattr(moved, name), getattr(anew, name))
 
 
 @pytest.mark.parametrize("scale", nightly_after_first([0.01, 100.0]))

@@ -203,9 +203,8 @@ export class App {
    */
   private redrawLines(): void {
     const { viewport, page, frames } = this;
-    if (viewport.software && !page.draws && frames.latency.lastMove < MAX_AWAITED_LATENCY_MS)
-      viewport.invalidateWithin(MAX_LINES_DELAY_MS);
-    else viewport.invalidate();
+    const waits = viewport.software && !page.draws && frames.latency.lastMove < MAX_AWAITED_LATENCY_MS;
+    viewport.invalidate(waits ? MAX_LINES_DELAY_MS : 0);
   }
 
   endDrag(): void {

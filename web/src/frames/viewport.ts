@@ -13,6 +13,7 @@ import {
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { ScreenPoint } from "../editing/picking";
 import type { Vec3 } from "../net/protocol";
+import { RedrawSchedule } from "./redraw_schedule";
 
 const MAX_DEVICE_PIXEL_RATIO = 2;
 
@@ -64,9 +65,7 @@ export class Viewport {
    */
   orbitGuessed: (() => void)[] = [];
   private sceneCenter: Vec3 = [0, 0, 0];
-  private scheduled = false;
-  /** Timer of a redraw that waits for another one. */
-  private deferred: ReturnType<typeof setTimeout> | undefined;
+  private readonly redraws = new RedrawSchedule((began) => this.redraw(began));
   private size = new Vector2(1, 1);
 
   constructor(private readonly host: HTMLElement) {
@@ -94,28 +93,10 @@ export class Viewport {
     return { width: this.size.x, height: this.size.y };
   }
 
-  /** Schedules a redraw for the browser's next frame. */
-  invalidate(): void {
-    if (this.scheduled) return;
-    this.scheduled = true;
-    clearTimeout(this.deferred);
-    this.deferred = undefined;
-    requestAnimationFrame((began) => {
-      this.scheduled = false;
-      for (const action of this.beforeFrame) action();
-      this.renderer.setRenderTarget(null);
-      this.renderer.clear();
-      this.renderer.render(this.scene, this.camera);
-      requestAnimationFrame((time) => {
-        this.frameTime += 0.2 * (Math.min(time - began, MAX_FRAME_MS) - this.frameTime);
-        for (const action of this.afterFrame) action(time);
-      });
-    });
-  }
-
-  /** Schedules a redraw in so many milliseconds, if none comes before. */
-  invalidateWithin(ms: number): void {
-    if (!this.scheduled) this.deferred ??= setTimeout(() => this.invalidate(), ms);
+  /** Schedules a redraw for the browser's next frame, or in so many milliseconds if none comes before. */
+  invalidate(within = 0): void {
+    if (within > 0) this.redraws.requestWithin(within);
+    else this.redraws.request();
   }
 
   /** Draws the scene into one pixel, which the frame that follows covers: its shaders are compiled then. */
@@ -225,6 +206,17 @@ export class Viewport {
   /** Unit viewing direction of the camera. */
   get forward(): Vector3 {
     return new Vector3(0, 0, -1).applyQuaternion(this.camera.getWorldQuaternion(new Quaternion()));
+  }
+
+  private redraw(began: number): void {
+    for (const action of this.beforeFrame) action();
+    this.renderer.setRenderTarget(null);
+    this.renderer.clear();
+    this.renderer.render(this.scene, this.camera);
+    requestAnimationFrame((time) => {
+      this.frameTime += 0.2 * (Math.min(time - began, MAX_FRAME_MS) - this.frameTime);
+      for (const action of this.afterFrame) action(time);
+    });
   }
 
   private setPose(c2w: readonly number[], fov_y_deg: number): void {
