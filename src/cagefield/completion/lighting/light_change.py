@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.completion.surfaces.surface_color import denoise_colors
@@ -35,6 +35,9 @@ PART_VERTICES = 16_384
 FACING_LOG_WEIGHT = 3.0
 """Log weight of a surfel with the normal of the vertex over one at a right angle to it."""
 
+CELL_VERTICES = 2
+"""Vertices along the edge of a cell by which vertices without a change of light are found."""
+
 MAX_LIGHT_DEPTH_VOXELS = 10.0
 """Maximum distance between a surface and a vertex in the surface's light, voxels."""
 
@@ -61,8 +64,7 @@ class LightChange:
         mask, log = np.zeros(block.shape, bool), np.zeros(0)
         if len(changed_rows):
             radius = MAX_LIGHT_DEPTH_VOXELS * max(block.spacing)
-            box, is_near = _vertices_near(block, surface.points[changed_rows])
-            mask[box] = is_near & (block.slot[box] >= 0)
+            mask = _vertices_near(block, surface, logs) & (block.slot >= 0)
             if where is not None:
                 mask &= where
             points, normals = block.positions(mask), block.normals_at(mask)
@@ -105,23 +107,49 @@ class LightChange:
         return values
 
 
-def _vertices_near(block: GridBlock, points: Array) -> tuple[tuple[slice, ...], Mask]:
-    """(slices of a block, mask [x,y,z] of the vertices there within MAX_LIGHT_DEPTH_VOXELS of points [N,3]).
+def _vertices_near(block: GridBlock, surface: Surfels, logs: Array) -> Mask:
+    """Mask [X,Y,Z] of the vertices whose light may change with log ratios [N] on surfels.
 
-    The light of all others stays: none of the surfels from which it is averaged has changed. The mask has
-    up to a voxel more.
+    The light of all others stays: none of the surfels from which it is averaged (`_mean_logs`) has changed.
+    Decided by cells of CELL_VERTICES^3 vertices: with h the distance of a cell's middle to its vertices, a
+    changed surfel is among the K nearest ones of a vertex only if it is at most 2 h further from the middle
+    than the K-th nearest.
     """
-    g = block.block_coordinates(points)
+    mask, changed = np.zeros(block.shape, bool), surface.take(np.flatnonzero(logs))
+    g = block.block_coordinates(changed.points)
     low = np.maximum(np.floor(g.min(axis=0) - MAX_LIGHT_DEPTH_VOXELS).astype(np.int64), 0)
     high = np.minimum(np.ceil(g.max(axis=0) + MAX_LIGHT_DEPTH_VOXELS).astype(np.int64) + 1, block.shape)
-    size = np.maximum(high - low, 0)
-    cells = np.clip(np.round(g).astype(np.int64) - low, 0, np.maximum(size - 1, 0))
-    is_far = np.ones(size, bool)
-    if is_far.size:
-        is_far[tuple(cells.T)] = False
-        reach = (MAX_LIGHT_DEPTH_VOXELS + 1.0) * max(block.spacing)
-        is_far = ndimage.distance_transform_edt(is_far, sampling=block.spacing) > reach
-    return tuple(slice(int(a), int(a + n)) for a, n in zip(low, size, strict=True)), ~is_far
+    count = -(np.minimum(low - high, 0) // CELL_VERTICES)
+    if not count.all():
+        return mask
+    middles = low + CELL_VERTICES * np.argwhere(np.ones(count, bool)) + 0.5 * (CELL_VERTICES - 1)
+    points = block.world_positions(middles)
+    h = _cell_radii(block, middles, points)
+    radius = MAX_LIGHT_DEPTH_VOXELS * max(block.spacing) + float(h.max())
+    to_changed = changed.nearest(points, 1, radius)[0][:, 0]
+    near = np.flatnonzero(np.isfinite(to_changed))
+    to_last = surface.nearest(points[near], LIGHT_NEIGHBORS, radius)[0][:, -1]
+    may_change = np.zeros(len(points), bool)
+    may_change[near] = to_changed[near] <= to_last + 2.0 * h[near]
+    cells = may_change.reshape(count)
+    for axis in range(3):
+        cells = np.repeat(cells, CELL_VERTICES, axis=axis)
+    box = tuple(slice(first, end) for first, end in zip(low, high, strict=True))
+    mask[box] = cells[tuple(slice(0, n) for n in high - low)]
+    return mask
+
+
+def _cell_radii(block: GridBlock, middles: Array, points: Array) -> Array:
+    """Distances [N] of the middles of cells to their vertices, world units; contracted fields have many.
+
+    middles [N,3]: block coordinates of the middles; points [N,3]: their world positions.
+    """
+    reach = 0.5 * (CELL_VERTICES - 1)
+    if not block.field.contracted:
+        return np.full(len(points), reach * float(np.linalg.norm(block.spacing)))
+    corners = (middles + reach * np.array(signs) for signs in product((-1.0, 1.0), repeat=3))
+    distances = [np.linalg.norm(block.world_positions(each) - points, axis=1) for each in corners]
+    return np.asarray(np.max(distances, axis=0))
 
 
 def _mean_logs(

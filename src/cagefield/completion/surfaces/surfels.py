@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from cagefield.completion.surfaces.grid_block import GridBlock, world_positions
+from cagefield.completion.surfaces.grid_block import GridBlock
 from cagefield.compute.cancellation import check_cancelled
 from cagefield.compute.parallel_parts import map_parts
 from cagefield.geometry import hexahedron
@@ -259,8 +259,7 @@ def extract_surfels(block: GridBlock) -> Surfels:
         return _half_transmittance(block.depth, vertices[part], direction[part])
 
     g = np.concatenate(map_parts(find, len(vertices), PART_POINTS))
-    middle = 0.5 * (block.stride - 1)
-    points = world_positions(block.field, block.stride * g + block.low + middle)
+    points = block.world_positions(g)
     return Surfels(points, _smooth_normals(points, normals, 2.5 * max(block.spacing)))
 
 
