@@ -72,13 +72,13 @@ def test_an_extended_block_is_that_of_all_its_vertices(below: EditStack) -> None
     whole = extract_block(field, below, np.array([[-0.3, -0.4, -0.3], [0.4, 0.7, 0.6]]))
     source = FieldVertices(field, below)
     changed = block.with_density(block.solid, np.zeros(int(block.solid.sum()), np.float32))
-    extended, other = extend_blocks((block, changed), VertexRange.from_block(whole), source.extract)
+    extended, other = extend_blocks(block, changed, VertexRange.from_block(whole), source.extract)
     assert extended.shape == whole.shape and (extended.low == whole.low).all()
     np.testing.assert_array_equal(extended.density, whole.density)
     np.testing.assert_array_equal(extended.slot >= 0, whole.slot >= 0)
     stored = whole.slot >= 0
     np.testing.assert_array_equal(extended.sh[extended.slot[stored]], whole.sh[whole.slot[stored]])
-    assert extend_blocks((whole,), VertexRange.from_block(block), source.extract) == [whole]
+    assert extend_blocks(whole, whole, VertexRange.from_block(block), source.extract) == (whole, whole)
     assert int((other.density != whole.density).sum()) == int(block.solid.sum())
     np.testing.assert_array_equal(other.slot >= 0, whole.slot >= 0)
     np.testing.assert_array_equal(embed_mask(whole, block, block.solid), other.density != whole.density)

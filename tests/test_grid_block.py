@@ -38,3 +38,17 @@ def test_another_density_has_properties_of_its_own() -> None:
     assert block.surface.any()
     emptied = block.with_density(block.solid, np.zeros(int(block.solid.sum()), np.float32))
     assert not emptied.surface.any() and not emptied.solid.any()
+
+
+def test_a_compact_block_has_the_coefficients_of_its_own_vertices() -> None:
+    field = ball_field(resolution=33)
+    part = extract_block(field, EditStack(), field.bounds).crop(
+        np.array([10, 10, 10]), np.array([18, 20, 22])
+    )
+    compact = part.compact()
+    stored = part.slot >= 0
+    assert len(compact.sh) == np.count_nonzero(stored) < len(part.sh)
+    np.testing.assert_array_equal(compact.slot >= 0, stored)
+    np.testing.assert_array_equal(compact.sh[compact.slot[stored]], part.sh[part.slot[stored]])
+    layers = part.to_layer(), compact.to_layer()
+    np.testing.assert_array_equal(layers[0].sh, layers[1].sh)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -230,6 +230,30 @@ def test_what_a_part_leaves_is_found_once_for_all_its_drags(
             stack = patcher.prepare([edit], stage=stage)
             assert patcher.attained_stage(stack) is PatchStage.INPAINTED
     np.testing.assert_array_equal(cache.plain.with_edits(stack).render(CAMERA).rgb, whole.rgb)
+
+
+def test_the_renderer_of_a_next_drag_is_made_at_rest(
+    cache: RendererCache, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A part that has moved: its next drag finds the patch of a drag in the renderer that is kept."""
+    for refinement in (Refinement.INPAINTED, FINAL):
+        cache.renderer(Shown(values_of((MOVED,))), refinement)
+    drafts = []
+    renderer = cache.edited.renderer
+
+    def kept(edits: Sequence[Edit], preserve_opacity: bool, refinement: Refinement, *args: Any) -> Any:
+        drafts.append((edits[-1], refinement))
+        return renderer(edits, preserve_opacity, refinement, *args)
+
+    monkeypatch.setattr(cache.edited, "renderer", kept)
+    cache.warm_light(Shown(values_of((MOVED,))), lambda: None)
+    (edit, refinement), *others = drafts
+    assert refinement is Refinement.DRAFT and edit.inner == MOVED.inner and not others
+    shift = edit.deformed.corners - MOVED.deformed.corners
+    assert 0.0 < np.abs(shift).max() < 0.01 * cache.scene.field.sample_spacing
+    at_rest = MOVED.replace(operations=())
+    cache.warm_light(Shown(values_of((at_rest,))), lambda: None)
+    assert len(drafts) == 1
 
 
 @pytest.mark.parametrize("quick", [False, True])

@@ -119,7 +119,7 @@ def place_part(removal: Removal, edit: Discrete, source: BlockSource) -> Destina
     near, region = VertexRange.from_block(removal.before), context.region
     if box is not None:
         near, region = source.vertices(box), _union(region, box, context.voxel)
-    before, under = extend_blocks((removal.before, removal.under), near, source.extract)
+    before, under = extend_blocks(removal.before, removal.under, near, source.extract)
     light = removal.light
     if before is not removal.before and light is not None:
         light = LightChange(embed_mask(before, removal.before, light.mask), light.log_ratio)
@@ -173,11 +173,12 @@ def _light_change(
         lambda: log_light_change(model, light_surfels, remaining, moved_solid, voxel),
         lambda: model.log_light([remaining, moved_solid], moved) - removal.log_light_on_part[in_part],
     )
-    change = LightChange.from_surfels(under, light_surfels, removal.strength * change_log, spacing)
     log = np.where(np.abs(log) < MIN_LOG_CHANGE, 0.0, log)
-    part = context.removed.take(in_part)
-    on_part = LightChange.from_surfels(removal.part_block, part, log, spacing, where=removal.inside_part)
-    return change, on_part
+    part, block = context.removed.take(in_part), removal.part_block
+    return run_both(
+        lambda: LightChange.from_surfels(under, light_surfels, removal.strength * change_log, spacing),
+        lambda: LightChange.from_surfels(block, part, log, spacing, where=removal.inside_part),
+    )
 
 
 def _onto_deformed(edit: Discrete) -> HexahedronMap:

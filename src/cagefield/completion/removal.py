@@ -95,7 +95,7 @@ class Removal:
             return self.before
         slices = slices_around(self.inside, PART_MARGIN_VERTICES)
         first, end = (np.array([getattr(each, name) for each in slices]) for name in ("start", "stop"))
-        return self.before.crop(first, end - 1)
+        return self.before.crop(first, end - 1).compact()
 
     @cached_property
     def inside_part(self) -> Mask:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.completion.surfaces.grid_block import GridBlock
+from cagefield.compute.parallel_parts import run_both
 from cagefield.typing import Mask
 
 Extract: TypeAlias = Callable[[NDArray[np.int64], NDArray[np.int64]], GridBlock]
@@ -69,18 +70,20 @@ class VertexRange:
         return VertexRange(first, last)
 
 
-def extend_blocks(blocks: Sequence[GridBlock], vertices: VertexRange, extract: Extract) -> list[GridBlock]:
-    """Blocks A of one place with all vertices of a range as well; `extract` gives those that they have not.
+def extend_blocks(
+    first: GridBlock, second: GridBlock, vertices: VertexRange, extract: Extract
+) -> tuple[GridBlock, GridBlock]:
+    """Two blocks of one place with all vertices of a range as well; `extract` gives those that they have not.
 
     The blocks themselves where they have all.
     """
-    own = VertexRange.from_block(blocks[0])
+    own = VertexRange.from_block(first)
     union = own.union(vertices)
     beyond = union.beyond(own)
     if beyond is None:
-        return list(blocks)
+        return first, second
     added = extract(beyond.first, beyond.shape)
-    return [_join(union, (added, block)) for block in blocks]
+    return run_both(lambda: _join(union, (added, first)), lambda: _join(union, (added, second)))
 
 
 def _join(vertices: VertexRange, parts: Sequence[GridBlock]) -> GridBlock:

@@ -252,6 +252,13 @@ class GridBlock:
         slices = tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))
         return replace(self, low=self.low + first, density=self.density[slices], slot=self.slot[slices])
 
+    def compact(self) -> GridBlock:
+        """Block with the coefficients of its own vertices alone; a cropped one has those of the whole."""
+        has_color = self.slot >= 0
+        slot = np.full(self.shape, -1, np.int64)
+        slot[has_color] = np.arange(np.count_nonzero(has_color))
+        return replace(self, slot=slot, sh=self.sh[self.slot[has_color]])
+
     def changed_from(self, other: GridBlock, tolerance: float = MIN_COEFFICIENT_DIFFERENCE) -> Mask:
         """Mask [X,Y,Z] of vertices whose density or color differs from an `other` block of the same place."""
         check_cancelled()
@@ -271,8 +278,8 @@ class GridBlock:
         is_stored = self.slot >= 0
         is_stored[0, 0, 0] = is_stored[-1, -1, -1] = True
         slot = self.slot[is_stored]
-        rows = np.concatenate([self.sh, np.zeros((1, *self.sh.shape[1:]), np.float32)])
-        sh = rows[np.where(slot >= 0, slot, len(self.sh))]
+        sh = np.zeros((len(slot), *self.sh.shape[1:]), np.float32)
+        sh[slot >= 0] = self.sh[slot[slot >= 0]]
         density = np.where(slot >= 0, self.density[is_stored], np.float32(0.0))
         field = self.field
         return VoxelField(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,8 @@ import numpy as np
 
 from cagefield.cameras.camera import Camera
 from cagefield.completion.inpainting.support_inpainting import load_solvers
-from cagefield.edits import Continuous, Edit, EditStack
+from cagefield.edits import Continuous, Copy, Edit, EditStack, Move
+from cagefield.errors import EditError
 from cagefield.fields.splat_field import SplatField
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
@@ -136,9 +138,19 @@ class RendererCache:
             renderer.render(camera)
 
     def warm_light(self, shown: Shown, proceed: Callable[[], None]) -> None:
-        """Light of the shown field, and around the last edit (`Patcher.warm`); `proceed` cancels."""
+        """Light of the shown field, and around the last edit (`Patcher.warm`); `proceed` cancels.
+
+        Where the last edit moves a part, the renderer of its next drag too: it has the patch of the drag.
+        """
         edits = self.edits(shown.edits)
         self.shown_scene(shown).patcher.warm(edits, preserve_opacity=shown.preserve_opacity, proceed=proceed)
+        last = edits[-1] if edits else None
+        if isinstance(last, Move | Copy) and last.changes_anything:
+            proceed()
+            with suppress(EditError):
+                moved = last.translate((1e-3 * self.scene.field.sample_spacing, 0.0, 0.0))
+                edited = self._renderers_of(shown)[1]
+                edited.renderer((*edits[:-1], moved), shown.preserve_opacity, Refinement.DRAFT, proceed)
 
     def renderer(
         self, shown: Shown, refinement: Refinement, proceed: Callable[[], None] | None = None
