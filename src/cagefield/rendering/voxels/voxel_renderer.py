@@ -12,7 +12,6 @@ from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
 from cagefield.compute.devices import floats, ints
 from cagefield.edits import Discrete, EditMap, EditStack
-from cagefield.edits.device.packing import widened
 from cagefield.errors import CagefieldError
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.images.render_result import Background, RenderResult
@@ -100,6 +99,7 @@ class VoxelRenderer:
         proceed: Callable[[], None] | None = None,
     ) -> None:
         from cagefield.compute.device_buffers import for_kernels
+        from cagefield.edits.device.packing import widened
         from cagefield.edits.device_stack import DeviceStack
         from cagefield.rendering.voxels.device_grid import occupancy_args
         from cagefield.rendering.voxels.drag_occupancy import FixedEdits, replaced_place
@@ -216,6 +216,8 @@ class VoxelRenderer:
 
 def _around(boxes: NDArray[np.float32], grid: GridArgs) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(lower [3], upper [3]) of the box around boxes [B,2,3], in a grid's own units; far away without any."""
+    from cagefield.edits.device.packing import widened
+
     if not len(boxes):
         return floats((1e30, 1e30, 1e30)), floats((1e30, 1e30, 1e30))
     lower, scale = np.asarray(grid.lower, float), np.asarray(grid.scale, float)

@@ -15,14 +15,13 @@ from cagefield.edits.device.kernels.edit_maps import EditArgs
 from cagefield.rendering.voxels.kernels.edited_ray import (
     IN_PLACE,
     LINE,
-    MIXED,
     EditedRay,
     edited_ray,
 )
 from cagefield.rendering.voxels.kernels.grid import F32, GridArgs, sh_basis, vec3
 from cagefield.rendering.voxels.kernels.ray_grid import safe_inverse, slab
 from cagefield.rendering.voxels.kernels.ray_stretch import (
-    MIN_TRANSMITTANCE,
+    MIN_LIGHT_LEFT,
     UNEDITED,
     EmptySpaceArgs,
     MarchArgs,
@@ -78,8 +77,8 @@ def march_tiles(
     out: [size.y * size.x, 8]: premultiplied rgb, opacity, sum of w t, and the premultiplied normal, 0 without
     `with_normals`. `edited`: UNEDITED to GRADED_BY_FLOWS.
 
-    The part of a ray that may lie in the edits' boxes is found first; only its samples in occupied blocks
-    evaluate the edits' maps.
+    The part of a ray that may lie in edits is found first; its stretches are found one by one, each at its
+    first sample in an occupied block.
     """
     across = (tiles.size.x + MARCH_TILE_PX - 1) // MARCH_TILE_PX
     qd.loop_config(block_dim=64)
@@ -99,19 +98,19 @@ def march_tiles(
             go = (camera.origin - grid.lower) * grid.scale
             gd = d * grid.scale
             inverse = safe_inverse(gd)
-            t = march.near
-            t_end = 1e30
+            ray = MarchedRay(
+                origin=camera.origin, d=d, go=go, gd=gd, inverse=inverse, t=march.near, t_end=1e30, T=1.0
+            )
             if qd.static(not contracted):
                 lo = qd.cast(space.bricks.origin, qd.f32)
                 hit = slab(go, inverse, lo, lo + 4.0 * qd.cast(space.bricks.dims, qd.f32))
-                t = qd.max(hit.x, march.near) + 0.5 * march.step
-                t_end = hit.y
-            ray = MarchedRay(origin=camera.origin, d=d, go=go, gd=gd, inverse=inverse, T=1.0)
+                ray.t = qd.max(hit.x, march.near) + 0.5 * march.step
+                ray.t_end = hit.y
             stretch = EditedRay(kind=IN_PLACE, until=1e30)
             if qd.static(edited == UNEDITED):
                 march_stretch(
-                    t, t_end, ray, stretch, basis,
-                    march, grid, space, edits, K, contracted, edited, with_normals, IN_PLACE,
+                    ray, stretch, basis,
+                    march, grid, space, edits, K, contracted, edited, with_normals, False,
                 )  # fmt: skip
             else:
                 through = slab(go, inverse, space.edit_lower, space.edit_upper)
@@ -121,27 +120,23 @@ def march_tiles(
                 ray.edit_out = through.y
                 stretch.until = ray.edit_in
                 seen = basis
-                while t < t_end and ray.T > MIN_TRANSMITTANCE:
-                    if t > stretch.until:
+                while ray.t < ray.t_end and ray.T > MIN_LIGHT_LEFT:
+                    if ray.t > stretch.until:
                         stretch = EditedRay(kind=IN_PLACE, until=1e30)
-                        if t <= ray.edit_out:
-                            stretch = edited_ray(t, camera.origin, d, edits)
+                        if ray.t <= ray.edit_out:
+                            stretch = edited_ray(ray.t, camera.origin, d, edits)
+                        seen = basis
                         if stretch.kind == LINE:
                             seen = sh_basis(stretch.velocity / qd.max(stretch.velocity.norm(), 1e-20), K)
                     if stretch.kind == IN_PLACE:
-                        t, t_end = march_stretch(
-                            t, t_end, ray, stretch, basis,
-                            march, grid, space, edits, K, contracted, edited, with_normals, IN_PLACE,
-                        )  # fmt: skip
-                    elif stretch.kind == MIXED:
-                        t, t_end = march_stretch(
-                            t, t_end, ray, stretch, basis,
-                            march, grid, space, edits, K, contracted, edited, with_normals, MIXED,
+                        march_stretch(
+                            ray, stretch, basis,
+                            march, grid, space, edits, K, contracted, edited, with_normals, False,
                         )  # fmt: skip
                     else:
-                        t, t_end = march_stretch(
-                            t, t_end, ray, stretch, seen,
-                            march, grid, space, edits, K, contracted, edited, with_normals, LINE,
+                        march_stretch(
+                            ray, stretch, seen,
+                            march, grid, space, edits, K, contracted, edited, with_normals, True,
                         )  # fmt: skip
             at = 8 * (y * tiles.size.x + x)
             for a in qd.static(range(3)):

@@ -1,8 +1,8 @@
 """The march through one stretch of a ray, by how its samples are mapped.
 
-Stretches end where a ray enters or leaves an edit (`edited_ray`). Each way of mapping has a loop of its own,
-so that samples in unedited space cost what they cost in an unedited field. Empty space is leapt over without
-regard to stretches: the next begins at the first sample in an occupied block.
+Stretches end where a ray enters or leaves an edit (`edited_ray`). Samples that stay in place have a loop of
+their own, in which they cost what they cost in an unedited field. Empty space is leapt over without regard
+to stretches: the next begins at the first sample in an occupied block.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
@@ -13,7 +13,7 @@ from cagefield.compute.quadrants import qd
 from cagefield.edits.device.kernels.edit_maps import EditArgs, map_sample
 from cagefield.edits.device.kernels.grade import grade_sample
 from cagefield.edits.device.kernels.lattice import displacement
-from cagefield.rendering.voxels.kernels.edited_ray import IN_PLACE, LATTICE, LINE, MIXED
+from cagefield.rendering.voxels.kernels.edited_ray import LATTICE, LINE
 from cagefield.rendering.voxels.kernels.grid import (
     GridArgs,
     contract_velocity,
@@ -35,7 +35,7 @@ UNEDITED, EDITED, EDITED_BY_FLOWS, GRADED, GRADED_BY_FLOWS = range(5)
 """Work of a march for edits: none, maps from lattices or closed forms, flows too (even numbers), and
 grades of colors with them (from GRADED on)."""
 
-MIN_TRANSMITTANCE = 1e-3
+MIN_LIGHT_LEFT = 1e-3
 """Share of the light at which a ray ends."""
 
 MIN_WEIGHT = 1e-4
@@ -75,6 +75,8 @@ MarchedRay = qd.types.struct(
     go=vec3,
     gd=vec3,
     inverse=vec3,
+    t=qd.f32,
+    t_end=qd.f32,
     edit_in=qd.f32,
     edit_out=qd.f32,
     T=qd.f32,
@@ -85,8 +87,8 @@ MarchedRay = qd.types.struct(
 """A ray o + t d of a pixel, and what its samples up to now add up to.
 
 go, gd, inverse: origin, velocity and 1 / velocity in grid coordinates or, in a contracted field, normalized
-ones; edit_in, edit_out: the part outside of which no edit changes anything. T: share of the light that is
-left; depth: sum of w t; rgb, normal: premultiplied.
+ones; t, t_end: the next sample, and where the field ends; edit_in, edit_out: the part outside of which no
+edit changes anything. T: share of the light that is left; depth: sum of w t; rgb, normal: premultiplied.
 """
 
 
@@ -98,13 +100,14 @@ LatticeSample = qd.types.struct(t=qd.f32, after=qd.f32, u=vec3, along=vec3)
 def known_displacement(known: qd.template(), stretch: qd.template(), t: qd.f32, h: qd.f32, edits: EditArgs):
     """(displacement, derivative along the ray) at t; h is the distance to the sample that follows.
 
-    Of samples that follow each other every second one is looked up, and the one between by the cubic Hermite
-    interpolant of its neighbors; `known` is the last one looked up.
+    Of samples that follow each other, no more than a node apart, every second one is looked up, and the one
+    between has the cubic Hermite interpolant of its neighbors; `known` is the last one looked up.
     """
     u = known.u
     along = known.along
     if t != known.t:
-        is_between = t == known.after and t + h <= stretch.until
+        is_near = h * qd.abs(stretch.velocity).max() <= 1.0
+        is_between = is_near and t == known.after and t + h <= stretch.until
         at = t
         if is_between:
             at = t + h
@@ -132,8 +135,6 @@ def known_displacement(known: qd.template(), stretch: qd.template(), t: qd.f32, 
 
 @qd.func
 def march_stretch(
-    t: qd.f32,
-    t_end: qd.f32,
     ray: qd.template(),
     stretch: qd.template(),
     basis: qd.template(),
@@ -145,50 +146,51 @@ def march_stretch(
     contracted: qd.template(),
     edited: qd.template(),
     with_normals: qd.template(),
-    path: qd.template(),
+    is_mapped: qd.template(),
 ):
-    """(t, t_end) after the samples of an `EditedRay` from t on, which are added to a `MarchedRay`.
+    """Adds the samples of an `EditedRay` to a `MarchedRay`, from its t on, which becomes that after the last.
 
-    `path`: IN_PLACE, LINE for those in one lattice, too, or MIXED. `basis`: the harmonics of d, or of the
-    direction that the line has in canonical space.
+    `is_mapped`: False where they are IN_PLACE. `basis`: the harmonics of d, or of the direction that a LINE
+    has in canonical space.
     """
     segment = MapSegment(end=-1e30)
     known = LatticeSample(t=-1e30, after=-1e30)
     is_in = 1
-    while is_in == 1 and t < t_end and ray.T > MIN_TRANSMITTANCE:
+    while is_in == 1 and ray.t < ray.t_end and ray.T > MIN_LIGHT_LEFT:
+        t = ray.t
         g, h, empty, leap, last = look_ahead(
             space.bricks, ray.go + t * ray.gd, ray.gd, ray.inverse, grid.half, march.step, contracted
         )
         if qd.static(contracted):
             if last == 1:
-                t_end = t
+                ray.t_end = t
         if empty == 1:
-            t += leap
+            ray.t += leap
         elif edited != UNEDITED and t > stretch.until:
             is_in = 0
         else:
             place = stretch.place
             moved = 0
             view = ray.d
-            if qd.static(path == MIXED):
-                canonical, view, place, moved = map_in_segments(
-                    segment, stretch, t, h, ray.origin, ray.d, edits, edited % 2 == 0
-                )
-                if moved == 1:
-                    g = to_grid(canonical, grid, contracted)
-            elif qd.static(path == LINE):
+            if qd.static(is_mapped):
                 moved = 1
                 if stretch.kind == LATTICE:
                     u, along = known_displacement(known, stretch, t, h, edits)
                     g = to_grid(ray.origin + t * ray.d + u, grid, contracted)
                     view = ray.d + along
-                else:
+                elif stretch.kind == LINE:
                     g = to_grid(stretch.start + t * stretch.velocity, grid, contracted)
                     view = stretch.velocity
+                else:
+                    canonical, view, place, moved = map_in_segments(
+                        segment, stretch, t, h, ray.origin, ray.d, edits, edited % 2 == 0
+                    )
+                    if moved == 1:
+                        g = to_grid(canonical, grid, contracted)
             # The last bricks reach beyond the grid, and an edit may map samples there.
             if g.min() < 0.0 or (g - qd.cast(grid.resolution - 1, qd.f32)).max() > 0.0:
                 place = -1
-            if qd.static(edited != UNEDITED):
+            if qd.static(is_mapped):
                 if moved == 1 and place == 0 and not is_occupied(space.canonical_bricks, g):
                     place = -1
             if place >= 0:
@@ -200,7 +202,7 @@ def march_stretch(
                 b = corner_weights(f)
                 raw = gather_density(grid.density, slots, b)
                 if raw > 0.0:
-                    if qd.static(edited != UNEDITED):
+                    if qd.static(is_mapped):
                         if march.preserve_opacity == 1 and moved == 1:
                             raw *= view.norm()
                     colors = mat3(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -212,14 +214,11 @@ def march_stretch(
                     w = ray.T * (1.0 - keep)
                     ray.T *= keep
                     if w > MIN_WEIGHT:
-                        c = vec3(0.0, 0.0, 0.0)
-                        if qd.static(path == IN_PLACE):
-                            c = gather_rgb(grid.sh, slots, b, basis, K)
-                        else:
-                            seen = basis
+                        seen = basis
+                        if qd.static(is_mapped):
                             if moved == 1 and stretch.kind != LINE:
                                 seen = sh_basis(view / qd.max(view.norm(), 1e-20), K)
-                            c = gather_rgb(grid.sh, slots, b, seen, K)
+                        c = gather_rgb(grid.sh, slots, b, seen, K)
                         c = qd.max(qd.min(c, 1.0), 0.0)
                         if qd.static(edited >= GRADED):
                             c = qd.max(qd.min(colors @ c, 1.0), 0.0)
@@ -232,14 +231,13 @@ def march_stretch(
                                 slope = pull_back(slope * grid.half, at_world) * grid.scale
                             else:
                                 slope = slope * grid.scale
-                            if qd.static(edited != UNEDITED):
+                            if qd.static(is_mapped):
                                 if moved == 1:
                                     slope = through_edits(
                                         slope, ray.origin + t * ray.d, edits, edited % 2 == 0
                                     )
                             ray.normal -= w * slope / qd.max(slope.norm(), 1e-12)
-            t += h
-    return t, t_end
+            ray.t += h
 
 
 @qd.func
