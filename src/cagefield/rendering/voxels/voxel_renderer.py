@@ -19,6 +19,7 @@ from cagefield.images.render_result import Background, RenderResult
 if TYPE_CHECKING:
     from cagefield.rendering.voxels.device_grid import DeviceGrid
     from cagefield.rendering.voxels.drag_occupancy import FixedEdits
+    from cagefield.rendering.voxels.kernels.grid import GridArgs
     from cagefield.rendering.voxels.occupancy import Occupancy
 
 BAND = 4
@@ -102,7 +103,7 @@ class VoxelRenderer:
         from cagefield.edits.device_stack import DeviceStack
         from cagefield.rendering.voxels.device_grid import occupancy_args
         from cagefield.rendering.voxels.drag_occupancy import FixedEdits, replaced_place
-        from cagefield.rendering.voxels.kernels.march import EmptySpaceArgs
+        from cagefield.rendering.voxels.kernels.ray_stretch import EmptySpaceArgs
         from cagefield.rendering.voxels.occupancy_deformed import Known, deform
 
         stack = DeviceStack.from_stack(self.edits)
@@ -123,7 +124,7 @@ class VoxelRenderer:
         self._space = EmptySpaceArgs(
             occupancy_args(self.occupancy, for_kernels(self.occupancy.codes)),
             self._canonical_bricks,
-            for_kernels(stack.boxes.astype(np.float32)),
+            *_around(stack.boxes, self.grid.args),
         )
 
     def render(
@@ -144,7 +145,7 @@ class VoxelRenderer:
         takes the place of the renderer's own.
         """
         from cagefield.compute.block_cyclic import block_cyclic_schedule
-        from cagefield.rendering.voxels.kernels import march
+        from cagefield.rendering.voxels.kernels import march, ray_stretch
 
         field = self.field
         x, y, width, height = _checked_region(region, camera)
@@ -158,12 +159,12 @@ class VoxelRenderer:
         pose = march.CameraArgs(
             directions, camera.width, floats(camera.c2w[:3, :3]), floats(camera.c2w[:3, 3])
         )
-        how = march.MarchArgs(length, near, int(self.preserve_opacity))
-        edited = march.UNEDITED if self._stack.n_edits == 0 else march.EDITED
+        how = ray_stretch.MarchArgs(length, near, int(self.preserve_opacity))
+        edited = ray_stretch.UNEDITED if self._stack.n_edits == 0 else ray_stretch.EDITED
         if self._stack.has_flows:
-            edited = march.EDITED_BY_FLOWS
+            edited = ray_stretch.EDITED_BY_FLOWS
         if self._stack.is_graded:
-            edited += march.GRADED - march.EDITED
+            edited += ray_stretch.GRADED - ray_stretch.EDITED
         rows = down if proceed is None else BAND
         for row in range(0, down, rows):
             if proceed is not None:
@@ -211,6 +212,17 @@ class VoxelRenderer:
         if devices.current() == "cpu":
             return np.empty(width * height * 8, np.float32)
         return self._sum_buffers.take(width * height * 8)
+
+
+def _around(boxes: NDArray[np.float32], grid: GridArgs) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(lower [3], upper [3]) of the box around boxes [B,2,3], in a grid's own units; far away without any."""
+    from cagefield.edits.device.packing import widened
+
+    if not len(boxes):
+        return floats((1e30, 1e30, 1e30)), floats((1e30, 1e30, 1e30))
+    lower, scale = np.asarray(grid.lower, float), np.asarray(grid.scale, float)
+    bounds = widened((np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])[None] - lower) * scale)[0]
+    return floats(bounds[0]), floats(bounds[1])
 
 
 def _jumps(edits: EditMap) -> bool:

@@ -4,7 +4,7 @@ Stretches end where the ray enters or leaves an edit's box, V, its outer cage or
 from the last to the first. A discrete edit changes nothing outside of V and of its region, and the one before
 it is tried; in the region its layer is read. In V, where that is a parallelepiped, the ray is straight also
 in canonical space; in the shell of a lattice it is straight in node units. Both lines are found once: a
-sample costs a multiplication in V, and one lattice lookup in the shell. They need all that the edit moves to
+sample costs a multiplication in V, and one lattice lookup at most in a shell. They need all that it moves to
 be read at one place (`ALONE` in `cagefield.edits.device.packing`); elsewhere each sample is mapped through
 the stack by itself.
 """
@@ -12,9 +12,9 @@ the stack by itself.
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
 from cagefield.compute.quadrants import qd
-from cagefield.edits.device.kernels.edit_maps import EditArgs, map_sample
+from cagefield.edits.device.kernels.edit_maps import EditArgs
 from cagefield.edits.device.kernels.hexahedron import image, read3, times
-from cagefield.edits.device.kernels.lattice import displacement, first_node, to_nodes
+from cagefield.edits.device.kernels.lattice import first_node, to_nodes
 from cagefield.edits.device.packing import (
     AFFINE,
     ALONE,
@@ -39,9 +39,6 @@ from cagefield.edits.device.packing import (
 )
 from cagefield.rendering.voxels.kernels.grid import vec3
 from cagefield.rendering.voxels.kernels.ray_grid import safe_inverse, slab
-
-STAYED, BENT, STRAIGHT = 0, 1, 2
-"""How a sample was moved: not at all, along a direction of its own, along the one that its ray has in V^c."""
 
 IN_PLACE, LINE, LATTICE, MIXED = range(4)
 """Stretches whose samples stay where they are; lie on a line in canonical space; lie in one lattice; are
@@ -166,35 +163,3 @@ def through(origin: vec3, d: vec3, params: qd.template(), e: qd.i32, at: qd.i32)
     velocity = times(params, e, at + MATRIX, d)
     one = vec3(1.0 + EDGE, 1.0 + EDGE, 1.0 + EDGE)
     return slab(xi, safe_inverse(velocity), -one, one), xi
-
-
-@qd.func
-def map_along(
-    ray: qd.template(),
-    t: qd.f32,
-    p: vec3,
-    d: vec3,
-    edits: EditArgs,
-    flows: qd.template(),
-):
-    """As `map_sample` for p = o + t d on the ray, and how p was moved (`STAYED`, `BENT`, `STRAIGHT`)."""
-    q = p
-    v = d
-    place = ray.place
-    moved = STAYED
-    if ray.kind == LINE:
-        q = ray.start + t * ray.velocity
-        v = ray.velocity
-        moved = STRAIGHT
-    elif ray.kind == LATTICE:
-        u, along = displacement(
-            ray.start + t * ray.velocity, ray.velocity, edits.lattice, ray.first, ray.resolution
-        )
-        q = p + u
-        v = d + along
-        moved = BENT
-    elif ray.kind == MIXED:
-        q, v, place = map_sample(p, d, edits, flows)
-        if qd.abs(q - p).max() > 0.0:
-            moved = BENT
-    return q, v, place, moved

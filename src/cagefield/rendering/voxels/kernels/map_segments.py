@@ -14,8 +14,7 @@ sample is mapped by itself.
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
 from cagefield.compute.quadrants import qd
-from cagefield.edits.device.kernels.edit_maps import EditArgs
-from cagefield.rendering.voxels.kernels.edited_ray import BENT, MIXED, map_along
+from cagefield.edits.device.kernels.edit_maps import EditArgs, map_sample
 from cagefield.rendering.voxels.kernels.grid import vec3
 
 SPAN = 5
@@ -42,7 +41,7 @@ MapSegment = qd.types.struct(
 )
 """A stretch of a ray: begin, end (ray parameters), whether it is interpolated, and the map at both ends.
 
-u0, u1: displacements; v0, v1: J d; place, moved: as `edited_ray.map_along` returns them.
+u0, u1: displacements; v0, v1: J d; place: as `map_sample` returns it; moved: 1 where it moved the end.
 """
 
 
@@ -57,13 +56,14 @@ def map_in_segments(
     edits: EditArgs,
     flows: qd.template(),
 ):
-    """As `map_along` at o + t d; h is the distance between samples, `segment` that of the sample before.
+    """As `map_sample` at o + t d, and 1 where that was moved.
 
-    The segment becomes the one in which t lies.
+    `ray`: the stretch, whose samples are MIXED; h: the distance between samples; `segment`: that of the
+    sample before, which becomes the one in which t lies.
     """
     # Stages: 0 and 1 map the ends of a new segment, 2 the sample alone. One call for all, as maps are long.
     stage = 3
-    if ray.kind != MIXED or ray.is_continuous == 0:
+    if ray.is_continuous == 0:
         stage = 2
         segment.end = -1e30
     elif t > segment.end + END_WIDTH * h:
@@ -93,7 +93,10 @@ def map_in_segments(
         elif stage == 1:
             at = segment.end
         p = origin + at * d
-        q, v, place, moved = map_along(ray, at, p, d, edits, flows)
+        q, v, place = map_sample(p, d, edits, flows)
+        moved = 0
+        if qd.abs(q - p).max() > 0.0:
+            moved = 1
         if stage == 0:
             segment.u0 = q - p
             segment.v0 = v
@@ -108,7 +111,7 @@ def map_in_segments(
             stage = 3
             length = segment.end - segment.begin
             defect = segment.u1 - segment.u0 - (0.5 * length) * (segment.v0 + segment.v1 - 2.0 * d)
-            if segment.place0 == place and segment.moved0 == BENT and moved == BENT:
+            if segment.place0 == place and segment.moved0 == 1 and moved == 1:
                 if qd.abs(defect).max() <= TOLERANCE * h:
                     segment.is_smooth = 1
             if segment.is_smooth == 0 and t > segment.begin:
@@ -129,7 +132,7 @@ def map_in_segments(
             q = origin + t * d + segment.u0 + x * (a + x * (c2 + x * c3))
             v = d + (a + x * (2.0 * c2 + 3.0 * x * c3)) / length
             place = segment.place0
-            moved = BENT
+            moved = 1
         elif t <= segment.begin:
             q = origin + t * d + segment.u0
             v = segment.v0

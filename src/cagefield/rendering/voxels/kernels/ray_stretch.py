@@ -1,0 +1,301 @@
+"""The march through one stretch of a ray, by how its samples are mapped.
+
+Stretches end where a ray enters or leaves an edit (`edited_ray`). Samples that stay in place have a loop of
+their own, in which they cost what they cost in an unedited field. Empty space is leapt over without regard
+to stretches: the next begins at the first sample in an occupied block.
+"""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+from dataclasses import dataclass
+
+from cagefield.compute.quadrants import qd
+from cagefield.edits.device.kernels.edit_maps import EditArgs, map_sample
+from cagefield.edits.device.kernels.grade import grade_sample
+from cagefield.edits.device.kernels.lattice import displacement
+from cagefield.rendering.voxels.kernels.edited_ray import LATTICE, LINE
+from cagefield.rendering.voxels.kernels.grid import (
+    GridArgs,
+    contract_velocity,
+    corner_slots,
+    corner_weights,
+    gather_density,
+    gather_rgb,
+    ivec3,
+    sh_basis,
+    to_grid,
+    vec3,
+)
+from cagefield.rendering.voxels.kernels.map_segments import MapSegment, map_in_segments
+from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs, is_occupied, look_ahead
+
+mat3 = qd.types.matrix(3, 3, qd.f32)
+
+UNEDITED, EDITED, EDITED_BY_FLOWS, GRADED, GRADED_BY_FLOWS = range(5)
+"""Work of a march for edits: none, maps from lattices or closed forms, flows too (even numbers), and
+grades of colors with them (from GRADED on)."""
+
+MIN_LIGHT_LEFT = 1e-3
+"""Share of the light at which a ray ends."""
+
+MIN_WEIGHT = 1e-4
+"""Weight in the picture below which a sample's color is not read."""
+
+
+@dataclass(frozen=True, eq=False)
+class MarchArgs:
+    """How rays are marched: step and nearest distance, in units of t, and the values computed for a
+    sample."""
+
+    step: qd.f32
+    near: qd.f32
+    preserve_opacity: qd.i32
+
+
+@dataclass(frozen=True, eq=False)
+class EmptySpaceArgs:
+    """Empty and unedited space, over which rays leap.
+
+    Attributes:
+        bricks: occupancy of the deformed field.
+        canonical_bricks: occupancy of the field as it was trained; begins at 0.
+        edit_lower, edit_upper: the box outside which no edit changes anything, in grid coordinates or, in a
+            contracted field, normalized ones.
+    """
+
+    bricks: OccupancyArgs
+    canonical_bricks: OccupancyArgs
+    edit_lower: vec3
+    edit_upper: vec3
+
+
+MarchedRay = qd.types.struct(
+    origin=vec3,
+    d=vec3,
+    go=vec3,
+    gd=vec3,
+    inverse=vec3,
+    t=qd.f32,
+    t_end=qd.f32,
+    edit_in=qd.f32,
+    edit_out=qd.f32,
+    T=qd.f32,
+    depth=qd.f32,
+    rgb=vec3,
+    normal=vec3,
+)
+"""A ray o + t d of a pixel, and what its samples up to now add up to.
+
+go, gd, inverse: origin, velocity and 1 / velocity in grid coordinates or, in a contracted field, normalized
+ones; t, t_end: the next sample, and where the field ends; edit_in, edit_out: the part outside of which no
+edit changes anything. T: share of the light that is left; depth: sum of w t; rgb, normal: premultiplied.
+"""
+
+
+LatticeSample = qd.types.struct(t=qd.f32, after=qd.f32, u=vec3, along=vec3)
+"""The displacement u in a lattice at t and its derivative; after: t of the sample that follows in turn."""
+
+
+@qd.func
+def known_displacement(known: qd.template(), stretch: qd.template(), t: qd.f32, h: qd.f32, edits: EditArgs):
+    """(displacement, derivative along the ray) at t; h is the distance to the sample that follows.
+
+    Of samples that follow each other, no more than a node apart, every second one is looked up, and the one
+    between has the cubic Hermite interpolant of its neighbors; `known` is the last one looked up.
+    """
+    u = known.u
+    along = known.along
+    if t != known.t:
+        is_near = h * qd.abs(stretch.velocity).max() <= 1.0
+        is_between = is_near and t == known.after and t + h <= stretch.until
+        at = t
+        if is_between:
+            at = t + h
+        u, along = displacement(
+            stretch.start + at * stretch.velocity,
+            stretch.velocity,
+            edits.lattice,
+            stretch.first,
+            stretch.resolution,
+        )
+        u1 = u
+        along1 = along
+        if is_between:
+            length = at - known.t
+            rise = (u1 - known.u) / length
+            along = 1.5 * rise - 0.25 * (known.along + along1)
+            u = 0.5 * (known.u + u1) + (0.125 * length) * (known.along - along1)
+            u += (t - 0.5 * (known.t + at)) * along
+        known.t = at
+        known.u = u1
+        known.along = along1
+    known.after = t + h
+    return u, along
+
+
+@qd.func
+def march_stretch(
+    ray: qd.template(),
+    stretch: qd.template(),
+    basis: qd.template(),
+    march: MarchArgs,
+    grid: GridArgs,
+    space: EmptySpaceArgs,
+    edits: EditArgs,
+    K: qd.template(),
+    contracted: qd.template(),
+    edited: qd.template(),
+    with_normals: qd.template(),
+    is_mapped: qd.template(),
+):
+    """Adds the samples of an `EditedRay` to a `MarchedRay`, from its t on, which becomes that after the last.
+
+    `is_mapped`: False where they are IN_PLACE. `basis`: the harmonics of d, or of the direction that a LINE
+    has in canonical space.
+    """
+    segment = MapSegment(end=-1e30)
+    known = LatticeSample(t=-1e30, after=-1e30)
+    is_in = 1
+    while is_in == 1 and ray.t < ray.t_end and ray.T > MIN_LIGHT_LEFT:
+        t = ray.t
+        g, h, empty, leap, last = look_ahead(
+            space.bricks, ray.go + t * ray.gd, ray.gd, ray.inverse, grid.half, march.step, contracted
+        )
+        if qd.static(contracted):
+            if last == 1:
+                ray.t_end = t
+        if empty == 1:
+            ray.t += leap
+        elif edited != UNEDITED and t > stretch.until:
+            is_in = 0
+        else:
+            place = stretch.place
+            moved = 0
+            view = ray.d
+            if qd.static(is_mapped):
+                moved = 1
+                if stretch.kind == LATTICE:
+                    u, along = known_displacement(known, stretch, t, h, edits)
+                    g = to_grid(ray.origin + t * ray.d + u, grid, contracted)
+                    view = ray.d + along
+                elif stretch.kind == LINE:
+                    g = to_grid(stretch.start + t * stretch.velocity, grid, contracted)
+                    view = stretch.velocity
+                else:
+                    canonical, view, place, moved = map_in_segments(
+                        segment, stretch, t, h, ray.origin, ray.d, edits, edited % 2 == 0
+                    )
+                    if moved == 1:
+                        g = to_grid(canonical, grid, contracted)
+            # The last bricks reach beyond the grid, and an edit may map samples there.
+            if g.min() < 0.0 or (g - qd.cast(grid.resolution - 1, qd.f32)).max() > 0.0:
+                place = -1
+            if qd.static(is_mapped):
+                if moved == 1 and place == 0 and not is_occupied(space.canonical_bricks, g):
+                    place = -1
+            if place >= 0:
+                cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), grid.resolution - 2), 0)
+                slots = corner_slots(
+                    grid.index, cell + ivec3(place, 0, 0), grid.resolution.y, grid.resolution.z
+                )
+                f = g - qd.cast(cell, qd.f32)
+                b = corner_weights(f)
+                raw = gather_density(grid.density, slots, b)
+                if raw > 0.0:
+                    if qd.static(is_mapped):
+                        if march.preserve_opacity == 1 and moved == 1:
+                            raw *= view.norm()
+                    colors = mat3(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+                    if qd.static(edited >= GRADED):
+                        if t >= ray.edit_in and t <= ray.edit_out:
+                            colors, thickness = grade_sample(ray.origin + t * ray.d, edits, edited % 2 == 0)
+                            raw *= thickness
+                    keep = qd.exp(-raw * h)
+                    w = ray.T * (1.0 - keep)
+                    ray.T *= keep
+                    if w > MIN_WEIGHT:
+                        seen = basis
+                        if qd.static(is_mapped):
+                            if moved == 1 and stretch.kind != LINE:
+                                seen = sh_basis(view / qd.max(view.norm(), 1e-20), K)
+                        c = gather_rgb(grid.sh, slots, b, seen, K)
+                        c = qd.max(qd.min(c, 1.0), 0.0)
+                        if qd.static(edited >= GRADED):
+                            c = qd.max(qd.min(colors @ c, 1.0), 0.0)
+                        ray.rgb += w * c
+                        ray.depth += w * t
+                        if qd.static(with_normals):
+                            slope = density_slope(grid.density, slots, f)
+                            if qd.static(contracted):
+                                at_world = (ray.origin + t * ray.d - grid.lower) * grid.scale
+                                slope = pull_back(slope * grid.half, at_world) * grid.scale
+                            else:
+                                slope = slope * grid.scale
+                            if qd.static(is_mapped):
+                                if moved == 1:
+                                    slope = through_edits(
+                                        slope, ray.origin + t * ray.d, edits, edited % 2 == 0
+                                    )
+                            ray.normal -= w * slope / qd.max(slope.norm(), 1e-12)
+            ray.t += h
+
+
+@qd.func
+def pull_back(slope: vec3, q: vec3):
+    """Gradient with respect to the normalized position q of a gradient with respect to contract(q)."""
+    return vec3(
+        slope.dot(contract_velocity(q, vec3(1.0, 0.0, 0.0))),
+        slope.dot(contract_velocity(q, vec3(0.0, 1.0, 0.0))),
+        slope.dot(contract_velocity(q, vec3(0.0, 0.0, 1.0))),
+    )
+
+
+@qd.func
+def through_edits(slope: vec3, p: vec3, edits: EditArgs, flows: qd.template()):
+    """J^T slope: the gradient in deformed space at p of a gradient in canonical space."""
+    out = vec3(0.0, 0.0, 0.0)
+    for a in range(3):
+        axis = vec3(0.0, 0.0, 0.0)
+        if a == 0:
+            axis.x = 1.0
+        elif a == 1:
+            axis.y = 1.0
+        else:
+            axis.z = 1.0
+        _q, v, _place = map_sample(p, axis, edits, flows)
+        along = slope.dot(v)
+        if a == 0:
+            out.x = along
+        elif a == 1:
+            out.y = along
+        else:
+            out.z = along
+    return out
+
+
+@qd.func
+def density_slope(density: qd.template(), slots: qd.template(), f: vec3):
+    """Gradient of the interpolated density in grid coordinates."""
+    r = qd.Vector.zero(qd.f32, 8)
+    for c in qd.static(range(8)):
+        r[c] = density[slots[c]]
+    e = 1.0 - f
+    x = (
+        (r[4] - r[0]) * e.y * e.z
+        + (r[5] - r[1]) * e.y * f.z
+        + (r[6] - r[2]) * f.y * e.z
+        + (r[7] - r[3]) * f.y * f.z
+    )
+    y = (
+        (r[2] - r[0]) * e.x * e.z
+        + (r[3] - r[1]) * e.x * f.z
+        + (r[6] - r[4]) * f.x * e.z
+        + (r[7] - r[5]) * f.x * f.z
+    )
+    z = (
+        (r[1] - r[0]) * e.x * e.y
+        + (r[3] - r[2]) * e.x * f.y
+        + (r[5] - r[4]) * f.x * e.y
+        + (r[7] - r[6]) * f.x * f.y
+    )
+    return vec3(x, y, z)
