@@ -7,6 +7,7 @@ asked of it.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -191,6 +192,7 @@ def project(
     buffers: Buffers | None = None,
     clusters: Clusters | None = None,
     detail: float = 0.0,
+    choose: Callable[[CameraArgs], NDArray[np.int32]] | None = None,
 ) -> Projection:
     """The splats as `camera` sees them, in the part (x, y, width, height) of its picture.
 
@@ -199,12 +201,14 @@ def project(
 
     With the splats' `clusters`, those out of sight cost nothing, and the picture is the same. A `detail`
     above 0 has representatives drawn for splats that lie within so many pixels; they have no normals.
+    Without clusters `choose` may say which rows a view draws, ascending.
     """
     buffers = buffers or Buffers()
     x, y, width, height = region or (0, 0, camera.width, camera.height)
     view = camera_args(camera, near, (x, y, width, height))
     if clusters is None:
-        sources = [_Source(splats, np.arange(len(splats), dtype=np.int32))]
+        rows = np.arange(len(splats), dtype=np.int32) if choose is None else choose(view)
+        sources = [_Source(splats, rows)]
     else:
         visible = View.from_region(
             view.origin, view.world_to_camera, view.focal, view.center, (width, height), view.limits, near,
