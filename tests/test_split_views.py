@@ -73,7 +73,8 @@ def test_a_size_is_where_the_difference_is_the_limit() -> None:
     covariances, limit = symmetric(chance, 9), 0.2
     weights = np.array([0.5, 0.5, -0.8] * 3, np.float32)
     starts, rows, sizes = np.array([0, 3, 6, 9]), np.arange(9), np.empty(3, np.float32)
-    sizes_of(starts, rows, means, covariances, weights, limit, 64, sizes)
+    limits = np.full(3, limit)
+    sizes_of(starts, rows, means, covariances, weights, limits, 64, sizes)
     for group, size in enumerate(sizes):
         worst = max(
             squared_difference(
@@ -83,7 +84,7 @@ def test_a_size_is_where_the_difference_is_the_limit() -> None:
         )
         # No more than the limit, and not much less: the size is known to a part of its interval.
         assert 0.5 * limit < np.sqrt(worst) / size <= limit * (1.0 + 1e-5)
-    sizes_of(starts, rows, means, covariances, weights, limit, 2, sizes)
+    sizes_of(starts, rows, means, covariances, weights, limits, 2, sizes)
     assert np.isinf(sizes).all()
 
 

@@ -16,13 +16,7 @@ from cagefield.edits.patch import SplatPatch
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import FACES, Cage
 from cagefield.geometry.quaternions import rotation_matrices
-from cagefield.rendering.splats.gaussian_profile import (
-    ENDS,
-    LEAST_OPAQUE,
-    MOST_OPAQUE,
-    mass_across,
-    part_between,
-)
+from cagefield.rendering.splats.gaussian_profile import LEAST_OPAQUE, MOST_OPAQUE, mass_across, part_below
 from cagefield.typing import Array, Mask
 from cagefield.warps.forward import to_deformed
 from cagefield.warps.interfaces import Warp
@@ -46,10 +40,21 @@ MIN_DRAWN_OPACITY = 1.0 / 255.0
 PART_SPLATS = 4096
 """Splats whose bend one thread computes at a time."""
 
-SPACING = 1.6
-"""Distance of children, in their standard deviations."""
+SPACING = (
+    (0.4, 0.45, 0.5, 0.55, 0.6, 0.66, 0.7, 0.75, 0.8, 0.83, 0.866, 0.9),
+    (2.22, 2.06, 1.92, 1.77, 1.63, 1.46, 1.34, 1.20, 1.07, 1.00, 0.92, 0.85),
+)
+"""Widths r of children, of which a row has three, and their distances in r: of the least squared difference
+to the splat's alpha along the row, summed over opacities of 0.02, 0.6 and 0.9. It is 1 % of that at r = 0.8,
+2 % at 0.7 and 8 % at 0.5; rows of 5 to 13 bring pictures no nearer to finely split ones."""
 
-LEAST_WIDTH = 0.35
+ROW_PASSES = 16
+"""Passes that fit the opacities of a row."""
+
+WIDEST = 0.9
+"""Largest r: splats that bend a little too much become rows narrower than they must be."""
+
+LEAST_WIDTH = 0.4
 """Least r of one splitting."""
 
 REACH = 2.0
@@ -133,20 +138,20 @@ def _rows(field: SplatField, rows: NDArray[np.int64], change: Array, most: float
 
 
 def _row(parent: NDArray[np.int64], direction: Array, r: Array, opacity: Array) -> Children:
-    """Rows of children of the widths r [M] along directions [M,3], for splats of an opacity [M]."""
+    """Rows of children of the widths r [M], at most WIDEST, along directions [M,3], for splats of an opacity
+    [M]."""
+    r = np.minimum(r, WIDEST)
     wide = np.sqrt(1.0 - r * r)
-    half = np.ceil(3.0 * wide / (SPACING * r)).astype(np.int64)
-    count = 2 * half + 1
-    owner = np.repeat(np.arange(len(parent)), count)
-    place = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count + half, count)
-    x = place * SPACING * r[owner]
+    owner = np.repeat(np.arange(len(parent)), 3)
+    gap = np.interp(r, *SPACING)[owner]
+    x = np.tile([-1.0, 0.0, 1.0], len(parent)) * gap * r[owner]
     alpha = np.minimum(opacity, MOST_OPAQUE)[owner]
     wanted = -np.log1p(-alpha * np.exp(-0.5 * x * x))  # optical depth of the splat in the middle of a child
     alpha = alpha * np.exp(-0.5 * (x / wide[owner]) ** 2)
-    for _ in range(8):
+    for _ in range(ROW_PASSES):
         depth = -np.log1p(-alpha)
         for step in (1, 2):
-            beside = -np.log1p(-alpha * np.exp(-0.5 * (step * SPACING) ** 2))
+            beside = -np.log1p(-alpha * np.exp(-0.5 * (step * gap) ** 2))
             same = owner[step:] == owner[:-step]
             depth[step:] += np.where(same, beside[:-step], 0.0)
             depth[:-step] += np.where(same, beside[step:], 0.0)
@@ -154,7 +159,7 @@ def _row(parent: NDArray[np.int64], direction: Array, r: Array, opacity: Array) 
     # The transmittance of the row beside its middle, over all the width across it, equals that of the splat.
     own, mass = mass_across(-np.expm1(-wanted)), mass_across(alpha)
     for step in (1, 2):
-        beside = mass_across(alpha * np.exp(-0.5 * (step * SPACING) ** 2))
+        beside = mass_across(alpha * np.exp(-0.5 * (step * gap) ** 2))
         same = owner[step:] == owner[:-step]
         mass[step:] += np.where(same, beside[:-step], 0.0)
         mass[:-step] += np.where(same, beside[step:], 0.0)
@@ -185,11 +190,10 @@ def cut_children(
     split = np.flatnonzero((best < REACH) & (field.opacities[rows] > LEAST_OPAQUE))
     t, parent, direction = t[split], rows[split], direction[split]
     alpha = np.minimum(field.opacities[parent].astype(np.float64), MOST_OPAQUE)
-    parts = [
-        Children(parent, direction, *part_between(alpha, low, high))
-        for low, high in ((np.full(len(t), -ENDS), t), (t, np.full(len(t), ENDS)))
-    ]
-    return concatenate_children(parts)
+    below = Children(parent, direction, *part_below(alpha, t))
+    above = Children(parent, -direction, *part_below(alpha, -t))
+    children = concatenate_children([below, above])
+    return children.take(np.flatnonzero(children.opacity > MIN_DRAWN_OPACITY))
 
 
 def concatenate_children(parts: list[Children]) -> Children:

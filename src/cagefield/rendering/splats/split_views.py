@@ -2,7 +2,7 @@
 
 Children stand for a splat that an edit bends or cuts (`splitting`), at any distance. Where a pixel covers
 more than the group's size (`kernels.split_sizes`) the picture of the splat, as the edit's affine part at its
-mean takes it, differs from theirs by less than LIMIT, and is drawn instead: once in place of many times, and
+mean takes it, differs from theirs by little, and is drawn instead: once in place of many times, and
 widened by the pixel's filter once, as the splats around it. The choice is made for each view on CPUs; GPUs,
 discs, normals, clusters, pages and files have all children.
 """
@@ -24,9 +24,9 @@ from cagefield.rendering.splats.splat_provenance import SplatSet
 from cagefield.rendering.splats.splitting import Split
 from cagefield.typing import Float32, Mask
 
-LIMIT = 0.2
-"""Root of the integral over the picture, in pixels, of the squared difference of two alphas that are one to
-the eye: a fifth of one pixel."""
+LIMIT = 0.05
+"""Root of the integral over the picture, in pixels, of the squared difference of two alphas, by the root of
+the number of splats that need not be drawn: so the error of a picture is the least for their number."""
 
 MOST_ROWS = 64
 """Groups of more children and parents have no size: these are always split."""
@@ -102,7 +102,9 @@ def split_views(
     sizes = np.empty(len(starts) - 1, np.float32)
     count = len(every) - len(numbers)
     weights = np.where(is_parent, -1.0, 1.0).astype(np.float32) * every.opacities[count:]
+    spared = np.bincount(groups, np.where(is_parent, -1, 1), len(sizes))
+    limits = LIMIT * np.sqrt(np.maximum(spared, 1.0))
     sizes_of(
-        starts, rows, every.means[count:], every.covariances[count:], weights, LIMIT, MOST_ROWS, sizes
+        starts, rows, every.means[count:], every.covariances[count:], weights, limits, MOST_ROWS, sizes
     )
     return SplitViews(every, count, starts, rows, groups, is_parent, sizes)

@@ -7,7 +7,7 @@ keeps its sum. For the amplitudes o_i of the children and -o_j of their parents,
     e^2(p) = sum over i, j of 2 pi o_i o_j sqrt(|S_i| |S_j| / |S|) exp(-d^T S^-1 d / 2),  S = S_i + S_j + 2 b,
 
 d the distance of their means, is the integral of the squared difference of the two pictures. e(p) / p falls
-with p. A group's size is the p at which it is a limit, along the worst of the three axes.
+with p. A group's size is the p at which it is the group's limit, along the worst of the three axes.
 """
 
 from __future__ import annotations
@@ -52,17 +52,17 @@ def squared_difference(axis, blur, means, covariances, weights, rows):
 
 
 @parallel_njit(lambda starts, *_: len(starts) - 1, **FAST)
-def sizes_of(begin, end, starts, rows, means, covariances, weights, limit, most, sizes):
+def sizes_of(begin, end, starts, rows, means, covariances, weights, limits, most, sizes):
     """Write the sizes [G] of the groups rows[starts[g]:starts[g+1]]; infinite for groups of more than `most`.
 
-    means [M,3], covariances [M,6] as `DeformedSplats`, weights [M]; `limit` is the largest e(p) / p.
+    means [M,3], covariances [M,6] as `DeformedSplats`, weights [M]; limits [G] are the largest e(p) / p.
     """
     for g in range(begin, end):
         chosen = rows[starts[g] : starts[g + 1]]
         if len(chosen) > most:
             sizes[g] = np.inf
             continue
-        size = 0.0
+        limit, size = limits[g], 0.0
         for axis in range(3):
             if size > 0.0:
                 here = squared_difference(axis, BLUR * size * size, means, covariances, weights, chosen)
