@@ -14,7 +14,7 @@ from cagefield.geometry.quaternions import quaternions_from_matrices, rotation_m
 from cagefield.images.metrics import psnr
 from cagefield.rendering.splats import split_children, splitting
 from cagefield.rendering.splats.bake_splats import baked_splats
-from cagefield.rendering.splats.gaussian_profile import OVERHANG, part_below
+from cagefield.rendering.splats.gaussian_profile import OPAQUE_PARTS, OVERHANG, PARTS, part_below
 from cagefield.rendering.splats.raster_splats import deformed_splats
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.rendering.splats.splitting import split_for_edits
@@ -170,22 +170,34 @@ def test_a_cut_is_two_parts_of_the_splat_that_add_up_to_it(offset: float) -> Non
     assert np.linalg.norm(got - C) < 0.15 * np.linalg.norm(C)
 
 
-@pytest.mark.parametrize("t", [-1.5, -0.6, 0.0, 0.7, 1.9])
-def test_a_part_is_the_nearest_splat_to_its_side(t: float) -> None:
+@pytest.mark.parametrize("t", [-1.5, -0.6, 0.0, 0.7, 1.8])
+@pytest.mark.parametrize(("parts", "beyond"), [(PARTS, OVERHANG[0]), (OPAQUE_PARTS, OVERHANG[1])])
+def test_a_part_is_the_nearest_splat_to_its_side(parts: np.ndarray, beyond: float, t: float) -> None:
     u = np.linspace(-8.0, 8.0, 16001)
-    side = np.where(u < t, 0.5 * np.exp(-0.5 * u * u), 0.0)
-    weight = np.where(u < t, 1.0, OVERHANG)
+    side = np.where(u < t, np.exp(-0.5 * u * u), 0.0)
+    weight = np.where(u < t, 1.0, beyond)
 
-    def off(x: float, r: float, opacity: float) -> float:
-        return float((weight * (opacity * np.exp(-0.5 * ((u - x) / r) ** 2) - side) ** 2).sum())
+    def off(x: float, r: float, amplitude: float) -> float:
+        return float((weight * (amplitude * np.exp(-0.5 * ((u - x) / r) ** 2) - side) ** 2).sum())
 
-    x, r, opacity, across = (float(each[0]) for each in part_below(*np.array([[0.5], [t]])))
-    best = off(x, r, opacity)
-    assert across == 1.0 and best < 0.5 * (weight * side**2).sum()
+    x, r, amplitude = (float(np.interp(t, parts[0], column)) for column in parts[1:])
+    best = off(x, r, amplitude)
+    assert best < 0.5 * (weight * side**2).sum()
     for step in (-0.05, 0.05):
-        assert best < off(x + step * r, r, opacity)
-        assert best < off(x, r * (1.0 + step), opacity)
-        assert best < off(x, r, opacity * (1.0 + step))
+        assert best < off(x + step * r, r, amplitude)
+        assert best < off(x, r * (1.0 + step), amplitude)
+        assert best < off(x, r, amplitude * (1.0 + step))
+
+
+def test_parts_of_splats_are_those_of_faint_and_of_opaque_ones() -> None:
+    opacity, t = np.array([0.3, 1.0, 0.993]), np.array([-1.0, -1.0, -1.0])
+    x, r, alpha, across = part_below(opacity, t)
+    (faint,), (opaque,) = (parts[1:, parts[0] == -1.0].T for parts in (PARTS, OPAQUE_PARTS))
+    np.testing.assert_allclose((x[0], r[0], alpha[0]), faint * [1.0, 1.0, 0.3], rtol=1e-6)
+    np.testing.assert_allclose((x[1], r[1], alpha[1]), opaque, rtol=1e-6)
+    assert r[0] < r[2] < r[1] and (across == 1.0).all()
+    # The opacity of a part is one that has a profile.
+    assert part_below(np.ones(1), np.ones(1))[2] < 1.0
 
 
 def test_splats_of_no_opacity_are_not_cut() -> None:

@@ -94,18 +94,18 @@ def test_near_views_have_all_children_and_far_ones_the_parents(name: str) -> Non
     split = split_of(splats, edits)
     assert split is not None
     views = split_views(splats, edits, split)
-    fine = views.seen(camera_args(camera(4.0, 100_000), 0.01))
+    fine = views.chosen(camera_args(camera(4.0, 100_000), 0.01))
     finite = np.isfinite(views.sizes[views.groups])
-    assert np.array_equal(fine, np.arange(views.count + np.count_nonzero(~views.is_parent)))
-    coarse = views.seen(camera_args(camera(1e5, 8), 0.01)) - views.count
-    assert np.array_equal(coarse[coarse >= 0], np.flatnonzero(views.is_parent == finite))
+    assert np.array_equal(fine, ~views.is_parent)
+    coarse = views.chosen(camera_args(camera(1e5, 8), 0.01))
+    assert np.array_equal(coarse, views.is_parent == finite)
     # Both are the splats of the edit: with children, and as it is without any.
     every = deformed_splats(splats, edits, split=split)
     own, whole = views.split(), deformed_splats(splats, edits)
     for attribute in ("means", "covariances", "opacities", "sh"):
         assert np.array_equal(getattr(own, attribute), getattr(every, attribute))
     if finite.all():
-        shown = views.splats.means[views.seen(camera_args(camera(1e5, 8), 0.01))]
+        shown = views.splats.means[np.append(np.ones(views.count, bool), coarse)]
         assert sorted(map(tuple, shown.tolist())) == sorted(map(tuple, whole.means.tolist()))
 
 
@@ -117,8 +117,8 @@ def test_pictures_of_chosen_splats_are_those_of_all_children(
     chosen = SplatRenderer(splats, edits)
     picture = chosen.render(camera(9.0, 24)).rgb
     assert chosen._split_views is not None
-    drawn = len(chosen._split_views.seen(camera_args(camera(9.0, 24), 0.01)))
-    assert drawn < len(chosen.splats)
+    drawn = chosen._split_views.chosen(camera_args(camera(9.0, 24), 0.01))
+    assert 0 < np.count_nonzero(drawn & chosen._split_views.is_parent)
     monkeypatch.setattr(views_module, "LIMIT", 1e-9)
     every = SplatRenderer(splats, edits).render(camera(9.0, 24)).rgb
     assert psnr(picture, every) > 40.0

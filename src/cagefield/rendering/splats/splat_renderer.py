@@ -206,7 +206,7 @@ class SplatRenderer:
             buffers=self._buffers,
             clusters=self._clusters() if len(self.splats) >= least else None,
             detail=0.0 if normals else detail,
-            choose=None if views is None else views.seen,
+            choose=None if views is None else views.chosen,
         )
 
     def _clusters(self) -> Clusters:

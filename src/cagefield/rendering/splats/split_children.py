@@ -24,9 +24,9 @@ from cagefield.warps.interfaces import Warp
 BEND = 0.08
 """Largest b of a splat that stays whole: a turn by 9 degrees from its middle to two standard deviations."""
 
-SMALL_SHARE = 0.015
+SMALL_SHARE = 0.02
 """Splats whose largest standard deviation is below this share of an edit's size may bend and be shaded more,
-as much as they are smaller: those that stay are off by 2 pixels, at two of it, of 800 that the edit fills."""
+as much as they are smaller: those that stay are off by 2.5 pixels, at two of it, of 800 that the edit fills."""
 
 SHADE = 0.15
 """Largest d of a splat that stays whole."""

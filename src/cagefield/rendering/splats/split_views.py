@@ -43,6 +43,7 @@ class SplitViews:
         groups: [C + P], the group of each.
         is_parent: [C + P].
         sizes: [G], world units: larger pixels show parents.
+        places: [3, C + P], means of the children and parents in the order of `rows`.
     """
 
     splats: DeformedSplats
@@ -52,6 +53,7 @@ class SplitViews:
     groups: NDArray[np.int64]
     is_parent: Mask
     sizes: Float32
+    places: Float32
 
     def split(self) -> DeformedSplats:
         """The splats of every view, and all children."""
@@ -60,16 +62,16 @@ class SplitViews:
         values = {name: getattr(self.splats, name) for name in names}
         return replace(self.splats, **{name: v if v is None else v[:kept] for name, v in values.items()})
 
-    def seen(self, view: CameraArgs) -> NDArray[np.int32]:
-        """Rows of the splats that a view draws, ascending."""
-        means = self.splats.means[self.count :]
-        toward = view.world_to_camera[2]
-        depths = means @ toward.astype(np.float32) - np.float32(toward @ view.origin)
-        nearest = np.minimum.reduceat(depths[self.rows], self.starts[:-1])
+    def chosen(self, view: CameraArgs) -> Mask:
+        """[C + P], True for the children and parents that a view draws."""
+        toward = view.world_to_camera[2].astype(np.float32)
+        x, y, z = self.places
+        depths = x * toward[0] + y * toward[1] + z * toward[2]
+        nearest = np.minimum.reduceat(depths, self.starts[:-1]) - np.float32(
+            view.world_to_camera[2] @ view.origin
+        )
         is_split = nearest < self.sizes * np.float32(view.focal.max())
-        shown = is_split[self.groups] != self.is_parent
-        rows = np.concatenate([np.arange(self.count), self.count + np.flatnonzero(shown)])
-        return rows.astype(np.int32)
+        return np.asarray(is_split[self.groups] != self.is_parent)
 
 
 def split_views(
@@ -107,4 +109,5 @@ def split_views(
     sizes_of(
         starts, rows, every.means[count:], every.covariances[count:], weights, limits, MOST_ROWS, sizes
     )
-    return SplitViews(every, count, starts, rows, groups, is_parent, sizes)
+    places = np.ascontiguousarray(every.means[count:][rows].T)
+    return SplitViews(every, count, starts, rows, groups, is_parent, sizes, places)

@@ -65,8 +65,8 @@ from cagefield.rendering.splats.split_children import (
 )
 from cagefield.typing import Array, Mask
 
-ROUNDS = 3
-"""Rounds in which split splats are examined again."""
+ROUNDS = 2
+"""Rounds in which splats that bend are split: a third one brings pictures no nearer to finely split ones."""
 
 CUTS = 1
 """Rounds in which splats across a cut, or a shadow's edge, are split: a second one takes parts of parts that
