@@ -114,8 +114,8 @@ def deformed_splats(
     A splat goes with its mean as a whole, see `moved_splats`, or its children do in its place, where it is
     `split`; those that no edit reaches are as they were, bit for bit. Maps are exact, whatever lattices the
     edits have, and kept for a living SplatSet and stacks that begin alike. `coarse` integrates a flow shell
-    with long steps, for pictures while something moves. `whole` are more splats, which come last. `proceed` is
-    called now and then, and gives the work up by raising.
+    with long steps, for pictures while something moves. `whole` are more splats, which come last. `proceed`
+    is called now and then, and gives the work up by raising.
 
     Raises:
         EditError: an edit that cannot be evaluated.
@@ -161,9 +161,7 @@ def deformed_where(
 
 
 def _rotations_of(splats: DeformedSplats) -> Float32:
-    return (
-        np.broadcast_to(_NO_TURN, (len(splats), 3, 3)) if splats.rotations is None else splats.rotations
-    )
+    return np.broadcast_to(_NO_TURN, (len(splats), 3, 3)) if splats.rotations is None else splats.rotations
 
 
 def _carried(

@@ -26,7 +26,7 @@ BEND = 0.08
 
 SMALL_SHARE = 0.02
 """Splats whose largest standard deviation is below this share of an edit's size may bend and be shaded more,
-as much as they are smaller: those that stay are off by 2.5 pixels, at two of it, of 800 that the edit fills."""
+as much as they are smaller: those that stay are off by 2.5 pixels, at two of it, where an edit fills 800."""
 
 SHADE = 0.15
 """Largest d of a splat that stays whole."""

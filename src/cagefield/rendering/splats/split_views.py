@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.edits import EditMap
-from cagefield.rendering.splats.kernels.split_sizes import sizes_of
 from cagefield.rendering.splats.kernels.splat_args import CameraArgs
+from cagefield.rendering.splats.kernels.split_sizes import sizes_of
 from cagefield.rendering.splats.raster_splats import DeformedSplats, Places, deformed_splats, deformed_where
 from cagefield.rendering.splats.splat_motion import moved_splats
 from cagefield.rendering.splats.splat_provenance import SplatSet
@@ -106,8 +106,6 @@ def split_views(
     weights = np.where(is_parent, -1.0, 1.0).astype(np.float32) * every.opacities[count:]
     spared = np.bincount(groups, np.where(is_parent, -1, 1), len(sizes))
     limits = LIMIT * np.sqrt(np.maximum(spared, 1.0))
-    sizes_of(
-        starts, rows, every.means[count:], every.covariances[count:], weights, limits, MOST_ROWS, sizes
-    )
+    sizes_of(starts, rows, every.means[count:], every.covariances[count:], weights, limits, MOST_ROWS, sizes)
     places = np.ascontiguousarray(every.means[count:][rows].T)
     return SplitViews(every, count, starts, rows, groups, is_parent, sizes, places)
