@@ -41,12 +41,16 @@ PART_SPLATS = 4096
 """Splats whose bend one thread computes at a time."""
 
 SPACING = (
-    (0.4, 0.45, 0.5, 0.55, 0.6, 0.66, 0.7, 0.75, 0.8, 0.83, 0.866, 0.9),
-    (2.22, 2.06, 1.92, 1.77, 1.63, 1.46, 1.34, 1.20, 1.07, 1.00, 0.92, 0.85),
+    (0.5, 0.55, 0.6, 0.66, 0.7, 0.75, 0.8, 0.83, 0.866, 0.9),
+    (1.92, 1.77, 1.63, 1.46, 1.34, 1.20, 1.07, 1.00, 0.92, 0.85),
 )
-"""Widths r of children, of which a row has three, and their distances in r: of the least squared difference
-to the splat's alpha along the row, summed over opacities of 0.02, 0.6 and 0.9. It is 1 % of that at r = 0.8,
-2 % at 0.7 and 8 % at 0.5; rows of 5 to 13 bring pictures no nearer to finely split ones."""
+"""Widths r of children where a splat bends, three in a row, and their distances in r: of the least squared
+difference to the splat's alpha along the row, summed over opacities of 0.02, 0.6 and 0.9. It is 1 % of that
+at r = 0.8, 2 % at 0.7 and 8 % at 0.5; rows of 5 to 13 bring pictures no nearer to finely split ones."""
+
+SHADED_SPACING = 1.6
+"""Distance, in r, of children on which light changes; as many as reach three standard deviations. They lie in
+place, where a row of three would show."""
 
 ROW_PASSES = 16
 """Passes that fit the opacities of a row."""
@@ -54,8 +58,8 @@ ROW_PASSES = 16
 WIDEST = 0.9
 """Largest r: splats that bend a little too much become rows narrower than they must be."""
 
-LEAST_WIDTH = 0.4
-"""Least r of one splitting."""
+LEAST_WIDTH, LEAST_SHADED_WIDTH = 0.5, 0.35
+"""Least r of one splitting, where a splat bends and where light changes on it."""
 
 REACH = 2.0
 """Standard deviations at which a splat ends, for cuts: 2 % of it may hang over."""
@@ -98,7 +102,7 @@ def bent_children(
     """Rows of children for the splats over which the map of an edit of a size, world units, bends."""
     warp = edit.exact_warp
     parts = map_parts(lambda part: _bend(warp, points[part], A[part], proceed), len(rows), PART_SPLATS)
-    return _rows(field, rows, np.concatenate(parts) * _weights(A, size), BEND)
+    return _rows(field, rows, np.concatenate(parts) * _weights(A, size), BEND, LEAST_WIDTH)
 
 
 def _weights(A: Array, size: float) -> Array:
@@ -127,24 +131,36 @@ def _bend(warp: Warp, points: Array, A: Array, proceed: Callable[[], None] | Non
     return np.asarray(bend)
 
 
-def _rows(field: SplatField, rows: NDArray[np.int64], change: Array, most: float) -> Children:
+def _rows(
+    field: SplatField, rows: NDArray[np.int64], change: Array, most: float, least_width: float
+) -> Children:
     """Rows of children for those splats [M] that change by more than `most` along an axis: change [M,3]."""
     axis, worst = change.argmax(axis=1), change.max(axis=1)
     opacity = field.opacities[rows].astype(np.float64)
     split = np.flatnonzero((worst * np.minimum(1.0, opacity / FAINT) > most) & (opacity > MIN_DRAWN_OPACITY))
-    r = np.maximum(most / worst[split], LEAST_WIDTH)
-    children = _row(rows[split], np.eye(3)[axis[split]], r, opacity[split])
+    r = np.maximum(most / worst[split], least_width)
+    children = _row(rows[split], np.eye(3)[axis[split]], r, opacity[split], least_width < LEAST_WIDTH)
     return children.take(np.flatnonzero(children.opacity > MIN_DRAWN_OPACITY))
 
 
-def _row(parent: NDArray[np.int64], direction: Array, r: Array, opacity: Array) -> Children:
+def _row(
+    parent: NDArray[np.int64], direction: Array, r: Array, opacity: Array, shaded: bool = False
+) -> Children:
     """Rows of children of the widths r [M], at most WIDEST, along directions [M,3], for splats of an opacity
-    [M]."""
+    [M]: three each, or as many as `shaded` ones have."""
     r = np.minimum(r, WIDEST)
     wide = np.sqrt(1.0 - r * r)
-    owner = np.repeat(np.arange(len(parent)), 3)
-    gap = np.interp(r, *SPACING)[owner]
-    x = np.tile([-1.0, 0.0, 1.0], len(parent)) * gap * r[owner]
+    half, gap = np.ones(len(r), np.int64), np.interp(r, *SPACING)
+    if shaded:
+        half, gap = (
+            np.ceil(3.0 * wide / (SHADED_SPACING * r)).astype(np.int64),
+            np.full(len(r), SHADED_SPACING),
+        )
+    count = 2 * half + 1
+    owner = np.repeat(np.arange(len(parent)), count)
+    place = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count + half, count)
+    gap = gap[owner]
+    x = place * gap * r[owner]
     alpha = np.minimum(opacity, MOST_OPAQUE)[owner]
     wanted = -np.log1p(-alpha * np.exp(-0.5 * x * x))  # optical depth of the splat in the middle of a child
     alpha = alpha * np.exp(-0.5 * (x / wide[owner]) ** 2)
@@ -224,7 +240,7 @@ def shaded_children(
             long = here[:, None] & (length > 0.5 * light.spacing.max())
             middle, step = points[np.nonzero(long)[0]], steps[long]
             change[long] = np.ptp([light.at(middle + way * step) for way in (-1.0, 0.0, 1.0)], axis=0)
-    return _rows(field, rows, change * _weights(A, size), SHADE)
+    return _rows(field, rows, change * _weights(A, size), SHADE, LEAST_SHADED_WIDTH)
 
 
 def _crossing(
