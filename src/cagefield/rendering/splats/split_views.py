@@ -10,7 +10,7 @@ discs, normals, clusters, pages and files have all children.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,10 +57,17 @@ class SplitViews:
 
     def split(self) -> DeformedSplats:
         """The splats of every view, and all children."""
-        kept = self.count + int(np.count_nonzero(~self.is_parent))
-        names = ("means", "covariances", "opacities", "sh", "rotations", "tangents")
-        values = {name: getattr(self.splats, name) for name in names}
-        return replace(self.splats, **{name: v if v is None else v[:kept] for name, v in values.items()})
+        kept = slice(self.count + int(np.count_nonzero(~self.is_parent)))
+        every = self.splats
+        return DeformedSplats(
+            every.means[kept],
+            every.covariances[kept],
+            every.opacities[kept],
+            every.sh[kept],
+            None if every.rotations is None else every.rotations[kept],
+            every.antialiased,
+            None if every.tangents is None else every.tangents[kept],
+        )
 
     def chosen(self, view: CameraArgs) -> Mask:
         """[C + P], True for the children and parents that a view draws."""

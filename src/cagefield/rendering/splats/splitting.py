@@ -70,8 +70,8 @@ ROUNDS = 2
 nearer to finely split ones."""
 
 CUTS = 1
-"""Rounds in which splats across a cut are split: a second one takes away parts of parts that hang over, and
-doubles their number, but brings pictures no nearer to finely split ones."""
+"""Rounds in which splats across a cut, or in its shadow, are split: a second one takes away parts of parts
+that hang over, and doubles their number, but brings pictures no nearer to finely split ones."""
 
 SMALL = 0.0035
 """Splats whose largest standard deviation is below this share of an edit's size are not tried for bending:
@@ -195,8 +195,9 @@ def _settled(
     """(which splats stay whole [N], children of the others), children split again where they must be."""
     stay, done, found = np.ones(len(splats), bool), list[_Part](), splats
     sources = np.arange(len(splats))
-    for turn in range(ROUNDS):
-        split = _split_once(found, before, step, gone if turn == 0 else None, room, proceed, turn < CUTS)
+    is_cut = isinstance(step.edit, Discrete) and not step.is_light_alone
+    for turn in range(CUTS if is_cut else ROUNDS):
+        split = _split_once(found, before, step, gone if turn == 0 else None, room, proceed)
         if split is None:
             break
         if turn == 0:
@@ -215,14 +216,8 @@ def _split_once(
     gone: Mask | None,
     room: float,
     proceed: Callable[[], None] | None,
-    cuts: bool,
 ) -> tuple[Mask, SplatSet, NDArray[np.int64]] | None:
-    """(which splats stay whole [N], the others' children, whose they are); None where all do, or are gone.
-
-    `cuts`: whether splats across a cut are split as well.
-    """
-    if isinstance(step.edit, Discrete) and not (cuts or isinstance(step.patch, SplatPatch)):
-        return None
+    """(which splats stay whole [N], the others' children, whose they are); None where all do, or are gone."""
     field, moved = splats.field, moved_splats(splats, before, proceed=proceed)
     if gone is not None and gone.any():
         moved = moved.without(gone)
@@ -238,14 +233,11 @@ def _split_once(
         assert isinstance(step.patch, SplatPatch)
         children = shaded_children(edit, step.patch, field, rows, points, A, _size(step))
     elif isinstance(edit, Discrete):
-        parts = [cut_children(edit, field, rows, points, A)] if cuts else []
+        children = cut_children(edit, field, rows, points, A)
         if isinstance(step.patch, SplatPatch):
-            cut = [part.parent for part in parts]
-            whole = np.flatnonzero(~np.isin(rows, np.concatenate(cut))) if cut else np.arange(len(rows))
-            parts.append(
-                shaded_children(edit, step.patch, field, rows[whole], points[whole], A[whole], _size(step))
-            )
-        children = concatenate_children(parts)
+            whole = np.flatnonzero(~np.isin(rows, children.parent))
+            lit = shaded_children(edit, step.patch, field, rows[whole], points[whole], A[whole], _size(step))
+            children = concatenate_children([children, lit])
     else:
         children = bent_children(edit, field, rows, points, A, _size(step), proceed)
     return _parted(splats, children, room) if len(children.parent) else None
