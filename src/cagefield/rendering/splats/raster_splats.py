@@ -106,6 +106,7 @@ def deformed_splats(
     preserve_opacity: bool = True,
     coarse: bool = False,
     split: Split | None = None,
+    whole: DeformedSplats | None = None,
     proceed: Callable[[], None] | None = None,
 ) -> DeformedSplats:
     """The splats that edits make of a field, those that are hidden left out; the field's own where none does.
@@ -113,28 +114,28 @@ def deformed_splats(
     A splat goes with its mean as a whole, see `moved_splats`, or its children do in its place, where it is
     `split`; those that no edit reaches are as they were, bit for bit. Maps are exact, whatever lattices the
     edits have, and kept for a living SplatSet and stacks that begin alike. `coarse` integrates a flow shell
-    with long steps, for pictures while something moves. `proceed` is called now and then, and gives the work
-    up by raising.
+    with long steps, for pictures while something moves. `whole` are more splats, which come last. `proceed`
+    is called now and then, and gives the work up by raising.
 
     Raises:
         EditError: an edit that cannot be evaluated.
     """
     splats = SplatSet.from_field(splats).with_pastes(edits)
     moved = moved_splats(splats, edits, coarse=coarse, proceed=proceed)
-    children = None
+    more = [] if whole is None else [whole]
     if split is not None:
         moved = moved.without(split.parents)
         others = moved_splats(split.children, edits, coarse=coarse, proceed=proceed)
-        children = _deformed(split.children.field, others, preserve_opacity, None)
-    return _deformed(splats.field, moved, preserve_opacity, children)
+        more.insert(0, deformed_where(split.children.field, others, preserve_opacity))
+    return deformed_where(splats.field, moved, preserve_opacity, *more)
 
 
-def _deformed(
-    field: SplatField, moved: MovedSplats, preserve_opacity: bool, more: DeformedSplats | None
+def deformed_where(
+    field: SplatField, moved: MovedSplats, preserve_opacity: bool, *more: DeformedSplats
 ) -> DeformedSplats:
-    """The splats of a field where they are, and `more` after them."""
+    """The splats of a field where they are, in the order of `Places`, and `more` after them."""
     base = DeformedSplats.of_field(field)
-    if moved.is_at_rest and more is None:
+    if moved.is_at_rest and not more:
         return base
     means, covariances, own, rotations = _carried(field, moved, preserve_opacity)
     places = Places(moved)
@@ -142,24 +143,25 @@ def _deformed(
     if base.tangents is not None:
         along = np.einsum("mij,mtj->mti", moved.jacobian, base.tangents[moved.source].reshape(-1, 2, 3))
         carried = along.reshape(-1, 6).astype(np.float32)
-        tangents = places.put(base.tangents, carried, None if more is None else more.tangents)
+        tangents = places.put(base.tangents, carried, *(part.tangents for part in more))
     turned = len(rotations) > 0 and float(np.abs(rotations - _NO_TURN).max()) > _TURNED
     every = None
-    if turned or (more is not None and more.rotations is not None):
-        after = None
-        if more is not None:
-            still = np.broadcast_to(_NO_TURN, (len(more), 3, 3))
-            after = still if more.rotations is None else more.rotations
-        every = places.put(np.broadcast_to(_NO_TURN, (len(field), 3, 3)), rotations, after)
+    if turned or any(part.rotations is not None for part in more):
+        still = np.broadcast_to(_NO_TURN, (len(field), 3, 3))
+        every = places.put(still, rotations, *(_rotations_of(part) for part in more))
     return DeformedSplats(
-        places.put(base.means, means, None if more is None else more.means),
-        places.put(base.covariances, covariances, None if more is None else more.covariances),
-        places.put(base.opacities, own, None if more is None else more.opacities),
-        places.put(base.sh, moved.sh(field.sh), None if more is None else more.sh),
+        places.put(base.means, means, *(part.means for part in more)),
+        places.put(base.covariances, covariances, *(part.covariances for part in more)),
+        places.put(base.opacities, own, *(part.opacities for part in more)),
+        places.put(base.sh, moved.sh(field.sh), *(part.sh for part in more)),
         every,
         field.antialiased,
         tangents,
     )
+
+
+def _rotations_of(splats: DeformedSplats) -> Float32:
+    return np.broadcast_to(_NO_TURN, (len(splats), 3, 3)) if splats.rotations is None else splats.rotations
 
 
 def _carried(
@@ -236,12 +238,12 @@ def changed_splats(
     grade = moved.grade
     if split is not None:
         others = moved_splats(split.children, edits, coarse=coarse, proceed=proceed)
-        more = _deformed(split.children.field, others, preserve_opacity, None)
+        more = deformed_where(split.children.field, others, preserve_opacity)
         resting = np.flatnonzero(~others.left)
         rows = np.concatenate([resting, others.source])
         in_order = np.argsort(rows) if others.is_whole else np.arange(len(rows))
         rows = rows[in_order]
-        turns = np.broadcast_to(_NO_TURN, (len(more), 3, 3)) if more.rotations is None else more.rotations
+        turns = _rotations_of(more)
         means, covariances = (
             np.concatenate([means, more.means]),
             np.concatenate([covariances, more.covariances]),
@@ -284,34 +286,38 @@ class Places:
     """Where moved splats are among those that are drawn: in their own rows, where each is shown once."""
 
     def __init__(self, moved: MovedSplats) -> None:
-        self._rows: NDArray[np.int64] | None = None
+        self.rows: NDArray[np.int64] = np.arange(len(moved.left))
+        """Numbers of the splats that are drawn, in their order."""
         self.moved = moved.source
         """Rows of those that moved."""
-        if not moved.is_whole:
+        self._are_own = moved.is_whole
+        if not self._are_own:
             kept = np.flatnonzero(~moved.left)
-            self._rows = np.concatenate([kept, moved.source])
-            self.moved = np.arange(len(kept), len(self._rows))
+            self.rows = np.concatenate([kept, moved.source])
+            self.moved = np.arange(len(kept), len(self.rows))
 
-    def put(self, values: Float32, moved: Float32 | None, more: Float32 | None = None) -> Float32:
+    def put(self, values: Float32, moved: Float32 | None, *more: Float32 | None) -> Float32:
         """The values of the splats that are drawn, of the field's [N,...].
 
         Values of moved splats are `moved` [M,...], or their own where it is None; `more` come after them.
         """
         from cagefield.rendering.splats.kernels.deformation import gather, scatter
 
-        if self._rows is None and moved is None and more is None:
+        parts = [part for part in more if part is not None]
+        if self._are_own and moved is None and not parts:
             return values
-        count = len(values) if self._rows is None else len(self._rows)
+        count = len(self.rows)
         width = int(np.prod(values.shape[1:]))
-        out = np.empty((count + (0 if more is None else len(more)), *values.shape[1:]), np.float32)
-        if self._rows is None:
+        out = np.empty((count + sum(map(len, parts)), *values.shape[1:]), np.float32)
+        if self._are_own:
             out[:count] = values
         else:
-            gather(values.reshape(len(values), width), self._rows, out[:count].reshape(count, width))
+            gather(values.reshape(len(values), width), self.rows, out[:count].reshape(count, width))
         if moved is not None:
             scatter(moved.reshape(len(moved), width), self.moved, out[:count].reshape(count, width))
-        if more is not None:
-            out[count:] = more
+        for part in parts:
+            out[count : count + len(part)] = part
+            count += len(part)
         return _frozen(out)
 
 

@@ -7,6 +7,7 @@ asked of it.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -24,7 +25,7 @@ from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE_PX
 from cagefield.rendering.splats.kernels.splat_args import CameraArgs, ProjectedSplats
 from cagefield.rendering.splats.raster_splats import DeformedSplats
 from cagefield.rendering.splats.splat_lod import Clusters, View
-from cagefield.typing import Float32
+from cagefield.typing import Float32, Mask
 
 Region = tuple[int, int, int, int]
 
@@ -191,6 +192,7 @@ def project(
     buffers: Buffers | None = None,
     clusters: Clusters | None = None,
     detail: float = 0.0,
+    choose: Callable[[CameraArgs], Mask] | None = None,
 ) -> Projection:
     """The splats as `camera` sees them, in the part (x, y, width, height) of its picture.
 
@@ -199,12 +201,16 @@ def project(
 
     With the splats' `clusters`, those out of sight cost nothing, and the picture is the same. A `detail`
     above 0 has representatives drawn for splats that lie within so many pixels; they have no normals.
+    Without clusters `choose` may say which of the last splats a view draws.
     """
     buffers = buffers or Buffers()
     x, y, width, height = region or (0, 0, camera.width, camera.height)
     view = camera_args(camera, near, (x, y, width, height))
     if clusters is None:
-        sources = [_Source(splats, np.arange(len(splats), dtype=np.int32))]
+        chosen = np.ones(0, bool) if choose is None else choose(view)
+        always = len(splats) - len(chosen)
+        last = (always + np.flatnonzero(chosen)).astype(np.int32)
+        sources = [_Source(splats, np.concatenate([np.arange(always, dtype=np.int32), last]))]
     else:
         visible = View.from_region(
             view.origin, view.world_to_camera, view.focal, view.center, (width, height), view.limits, near,
@@ -220,6 +226,8 @@ def project(
     packed = buffers.take("packed", (count, PACKED), np.float32)
     keys = buffers.take("keys", (count,), np.float32)
     tiles = buffers.take("tiles", (count, 4), np.int32)
+    if clusters is None:
+        tiles[always:][~chosen, :2] = 0
     shown, begin = [], 0
     for source in sources:
         end = begin + len(source.splats)
@@ -233,8 +241,11 @@ def project(
             splats.antialiased,
             ProjectedSplats(packed[begin:end], keys[begin:end], tiles[begin:end]),
         )
-        part = tiles[begin:end] if len(source.rows) == end - begin else tiles[begin:end][source.rows]
-        shown.append(source.rows[part[:, 1] > part[:, 0]] + np.int32(begin))
+        if clusters is None:
+            shown.append(np.flatnonzero(tiles[:, 1] > tiles[:, 0]))
+        else:
+            part = tiles[begin:end] if len(source.rows) == end - begin else tiles[begin:end][source.rows]
+            shown.append(source.rows[part[:, 1] > part[:, 0]] + np.int32(begin))
         begin = end
     check_cancelled()
     tiled = pairs_of_tiles(np.concatenate(shown), keys, tiles, packed, False, width, height, buffers)

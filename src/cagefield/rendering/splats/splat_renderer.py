@@ -26,6 +26,7 @@ from cagefield.rendering.splats.rasterizer import (
 )
 from cagefield.rendering.splats.splat_lod import MIN_CLUSTERED_SPLATS, Clusters
 from cagefield.rendering.splats.splat_provenance import SplatSet
+from cagefield.rendering.splats.split_views import SplitViews, split_views
 from cagefield.rendering.splats.splitting import split_of
 from cagefield.typing import Float32
 
@@ -68,9 +69,7 @@ class SplatRenderer:
         self.field = self._set.field
         self.edits: EditMap = edits if edits is not None else EditStack([])
         self.preserve_opacity = preserve_opacity
-        self.splats: DeformedSplats = deformed_splats(
-            self._set, self.edits, preserve_opacity=preserve_opacity, split=split_of(self._set, self.edits)
-        )
+        self._deform()
         self._buffers = Buffers()
         self._normals: Float32 | None = None
         self._arrays: SplatArrays | None = None
@@ -93,16 +92,29 @@ class SplatRenderer:
         other.edits = edits
         if preserve_opacity is not None:
             other.preserve_opacity = preserve_opacity
-        other.splats = deformed_splats(
-            self._set,
-            edits,
-            preserve_opacity=other.preserve_opacity,
-            coarse=coarse,
-            split=None if coarse else split_of(self._set, edits, proceed=proceed),
-            proceed=proceed,
-        )
+        other._deform(coarse, proceed)
         other._normals = other._arrays = None
         return other
+
+    def _deform(self, coarse: bool = False, proceed: Callable[[], None] | None = None) -> None:
+        """Deforms the splats: `splats` with all children, `_split_views` for those that views choose from."""
+        split = None if coarse else split_of(self._set, self.edits, proceed=proceed)
+        self.splats: DeformedSplats
+        self._split_views: SplitViews | None = None
+        if split is None or devices.is_gpu() or self.field.discs:
+            self.splats = deformed_splats(
+                self._set,
+                self.edits,
+                preserve_opacity=self.preserve_opacity,
+                coarse=coarse,
+                split=split,
+                proceed=proceed,
+            )
+            return
+        self._split_views = split_views(
+            self._set, self.edits, split, preserve_opacity=self.preserve_opacity, proceed=proceed
+        )
+        self.splats = self._split_views.split()
 
     def render(
         self,
@@ -184,8 +196,9 @@ class SplatRenderer:
                 self._arrays = device_rasterizer.SplatArrays(self.splats, self._normals)
             return device_rasterizer.project(self._arrays, camera, near=near, region=region)
         least = MIN_MERGED_SPLATS if self.edits.steps else MIN_CLUSTERED_SPLATS
+        views = None if normals or len(self.splats) >= least else self._split_views
         return project(
-            self.splats,
+            self.splats if views is None else views.splats,
             camera,
             near=near,
             region=region,
@@ -193,6 +206,7 @@ class SplatRenderer:
             buffers=self._buffers,
             clusters=self._clusters() if len(self.splats) >= least else None,
             detail=0.0 if normals else detail,
+            choose=None if views is None else views.chosen,
         )
 
     def _clusters(self) -> Clusters:

@@ -13,9 +13,9 @@ F(m) + J A z, which is right as far as F is affine over it, and in one color. Th
 
       b_ij = |(J(m + 2 a_i) - J(m - 2 a_i)) a_j| / max over k = i, j of |F(m + 2 a_k) - F(m - 2 a_k)|.
 
-  b_i is the largest of them. Where b_i > BEND the splat becomes a row of narrower ones along a_i: N(0, 1) is
-  the convolution of N(0, r^2) and N(0, 1 - r^2), so children of the standard deviation r at distances of
-  SPACING r, weighted by N(0, 1 - r^2), add up to it, but for a ripple of 2 exp(-2 (pi / SPACING)^2) = 0.1 %.
+  b_i is the largest of them. Where b_i > BEND the splat becomes a row of three narrower ones along a_i:
+  N(0, 1) is the convolution of N(0, r^2) and N(0, 1 - r^2), so children of the standard deviation r, weighted
+  by N(0, 1 - r^2), add up to it, at the distances of SPACING to a few per cent.
   With r = BEND / b_i they bend by BEND at most: b is proportional to the width. Of small splats b counts less
   (`split_children.SMALL_SHARE`). It is not where J jumps, on
   the faces of cages, and splats across these are split ROUNDS times. Opacities are such that
@@ -24,10 +24,9 @@ F(m) + J A z, which is right as far as F is affine over it, and in one color. Th
   are flatter than the splat's opacity where that is large: children as wide as the splat across the row would
   make it thicker, each round again. They are narrower, so that the depth on all the width is the splat's.
 - Cuts. A discrete edit takes the inside of a cage away. A splat through a face, at t standard deviations of
-  its own across it, becomes the parts of it on both sides. A ray at u standard deviations from its middle has
-  the optical depth T(u) = -log(1 - a exp(-u^2 / 2)), a the opacity. A child has the integral, mean and
-  variance over u of T below or above t, and across u the width that gives it T's integral over that half of a
-  plane. Of faint splats T is a normal distribution, and children have its moments where it is cut off.
+  its own across it, becomes two, one for the part of it on either side: nearest to its alpha there and to
+  none beyond the face, in the least squares of `gaussian_profile.PARTS`. Of alpha a exp(-(u^2 + v^2) / 2) a
+  cut across u is a factor, so they are as wide as it along the face.
 - Light. A patch (`edits.patch`) multiplies a splat's colors by one number. Where the log of that changes by
   d > SHADE among m - a_i, m and m + a_i the splat becomes a row along a_i as where it bends, with
   r = SHADE / d, faint and small ones where it changes by more. It does not where a_i is shorter than half
@@ -37,8 +36,7 @@ Each child goes its own way then. Children are canonical splats; of edits in a s
 of those before it. Steps of light alone come last, whatever their place in the stack: results of the others
 do not depend on them, and stay valid when light arrives (`_known_states`).
 
-Source: ours. For faint splats a cut has the moments of the truncated normal distribution: Johnson, Kotz and
-Balakrishnan, "Continuous Univariate Distributions" (1994), chapter 13.
+Source: ours.
 """
 
 from __future__ import annotations
@@ -67,11 +65,13 @@ from cagefield.rendering.splats.split_children import (
 )
 from cagefield.typing import Array, Mask
 
-ROUNDS = 3
-"""Rounds in which split splats are examined again."""
+ROUNDS = 2
+"""Rounds in which splats that bend, or the light on which changes, are split: a third one brings pictures no
+nearer to finely split ones."""
 
-CUTS = 2
-"""Rounds in which splats across a cut, or a shadow's edge, are split."""
+CUTS = 1
+"""Rounds in which splats across a cut, or in its shadow, are split: a second one takes away parts of parts
+that hang over, and doubles their number, but brings pictures no nearer to finely split ones."""
 
 SMALL = 0.0035
 """Splats whose largest standard deviation is below this share of an edit's size are not tried for bending:
@@ -195,7 +195,8 @@ def _settled(
     """(which splats stay whole [N], children of the others), children split again where they must be."""
     stay, done, found = np.ones(len(splats), bool), list[_Part](), splats
     sources = np.arange(len(splats))
-    for turn in range(CUTS if isinstance(step.edit, Discrete) else ROUNDS):
+    is_cut = isinstance(step.edit, Discrete) and not step.is_light_alone
+    for turn in range(CUTS if is_cut else ROUNDS):
         split = _split_once(found, before, step, gone if turn == 0 else None, room, proceed)
         if split is None:
             break
