@@ -119,6 +119,8 @@ def test_pictures_of_chosen_splats_are_those_of_all_children(
     assert chosen._split_views is not None
     drawn = chosen._split_views.chosen(camera_args(camera(9.0, 24), 0.01))
     assert np.count_nonzero(drawn & chosen._split_views.is_parent) > 0
+    with_normals = chosen.render(camera(9.0, 24), normals=True)
+    assert np.array_equal(with_normals.rgb, picture) and with_normals.normals is not None
     monkeypatch.setattr(views_module, "LIMIT", 1e-9)
     every = SplatRenderer(splats, edits).render(camera(9.0, 24)).rgb
     assert psnr(picture, every) > 40.0

@@ -175,8 +175,11 @@ class SplatRenderer:
 
         `detail` as `rasterizer.project`, on CPUs alone. Discs are projected there in any case.
         """
+        least = MIN_MERGED_SPLATS if self.edits.steps else MIN_CLUSTERED_SPLATS
+        views = None if len(self.splats) >= least else self._split_views
+        splats = self.splats if views is None else views.splats
         if normals and self._normals is None:
-            self._normals = flattest_axes(self.splats.covariances)
+            self._normals = flattest_axes(splats.covariances)
         near = max(near, near_depth(self.field.bounds))
         if self.splats.tangents is not None:
             from cagefield.rendering.splats.discs import project_discs
@@ -195,10 +198,8 @@ class SplatRenderer:
             if self._arrays is None or (normals and not self._arrays.has_normals):
                 self._arrays = device_rasterizer.SplatArrays(self.splats, self._normals)
             return device_rasterizer.project(self._arrays, camera, near=near, region=region)
-        least = MIN_MERGED_SPLATS if self.edits.steps else MIN_CLUSTERED_SPLATS
-        views = None if normals or len(self.splats) >= least else self._split_views
         return project(
-            self.splats if views is None else views.splats,
+            splats,
             camera,
             near=near,
             region=region,

@@ -4,7 +4,7 @@ Children stand for a splat that an edit bends or cuts (`splitting`), at any dist
 more than the group's size (`kernels.split_sizes`) the picture of the splat, as the edit's affine part at its
 mean takes it, differs from theirs by little, and is drawn instead: once in place of many times, and
 widened by the pixel's filter once, as the splats around it. The choice is made for each view on CPUs; GPUs,
-discs, normals, clusters, pages and files have all children.
+discs, clusters, pages and files have all children.
 """
 
 from __future__ import annotations
