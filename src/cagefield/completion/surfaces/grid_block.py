@@ -141,7 +141,7 @@ class GridBlock:
     def world_positions(self, g: GridValues | NDArray[np.int64]) -> Array:
         """World positions [N,3] of block coordinates [N,3]."""
         center = 0.5 * (self.stride - 1)
-        return world_positions(self.field, self.stride * np.asarray(g) + self.low + center)
+        return world_positions(self.field, self.stride * np.asarray(g, np.float64) + self.low + center)
 
     def interpolate(self, values: GridValues, points: Array, outside: float = 0.0) -> NDArray[np.float64]:
         """Trilinear interpolation [N] of `values` [X,Y,Z] at world positions [N,3]."""

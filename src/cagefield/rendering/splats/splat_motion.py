@@ -209,7 +209,7 @@ class MovedSplats:
         # Splats that the edit leaves: those in their own places, and those that earlier edits took there.
         at_rest = _under_patch(splats, patch, edit)
         is_here = ~self.left[at_rest.rows]
-        still, gone, log = (each[is_here] for each in (at_rest.rows, at_rest.gone, at_rest.log_gains))
+        still, gone, log = at_rest.rows[is_here], at_rest.gone[is_here], at_rest.log_gains[is_here]
         gone_elsewhere, log_elsewhere = _change_at(patch, edit, self.points[:here])
         lit = np.flatnonzero((np.abs(log) > MIN_LOG_GAIN) & ~gone)
         gains[:here] *= np.exp(log_elsewhere)[:, None]
