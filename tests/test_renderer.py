@@ -316,6 +316,15 @@ def test_maps_interpolated_along_rays_show_each_sample_mapped_alone():
     assert np.sqrt((difference**2).mean()) < 5e-4
 
 
+def test_arcs_in_a_lattice_show_each_sample_mapped_alone():
+    turned = FLOWS[0].replace(lattice=32).rotate((0.0, 0.2, 0.3))
+    alone = drawn(Edit.delete(Cage.box((-0.95, -0.75, 0.85), 0.04)), turned)
+    difference = np.abs(drawn(turned) - alone)
+    assert difference.max() < 0.02
+    assert np.sqrt((difference**2).mean()) < 7e-4
+    assert np.sqrt(((drawn() - alone) ** 2).mean()) > 0.02  # the edit shows
+
+
 def test_maps_are_interpolated_through_a_light_and_not_where_a_cut_reaches():
     far = Edit.delete(Cage.box((-0.9, 0.0, 0.0), 0.05))
     light = PreparedEdit(Edit.delete(Cage.box((-0.2, 0, 0.1), 1.6)), is_light=True)

@@ -120,8 +120,9 @@ def test_quick_pictures_show_the_same(renderers: RendererCache, edits: tuple[Edi
     )
     exact = renderers.part(task(*edits), renderers.renderer(shown, FINAL).renderer, WHOLE, lambda: False)
     assert quick is not None and exact is not None
-    # The lattices are the same here (24 nodes), and what the coarse occupancy adds is empty.
-    np.testing.assert_array_equal(quick.rgb, exact.rgb)
+    # The lattices are the same here (24 nodes), and what the coarse occupancy adds is empty; but arcs in a
+    # lattice begin at the first sample in an occupied block.
+    np.testing.assert_allclose(quick.rgb, exact.rgb, rtol=0.0, atol=1e-3)
 
 
 def test_a_quick_lattice_is_coarser_and_close(renderers: RendererCache) -> None:

@@ -4,9 +4,9 @@ Stretches end where the ray enters or leaves an edit's box, V, its outer cage or
 from the last to the first. A discrete edit changes nothing outside of V and of its region, and the one before
 it is tried; in the region its layer is read. In V, where that is a parallelepiped, the ray is straight also
 in canonical space; in the shell of a lattice it is straight in node units. Both lines are found once: a
-sample costs a multiplication in V, and one lattice lookup at most in a shell. They need all that it moves to
-be read at one place (`ALONE` in `cagefield.edits.device.packing`); elsewhere each sample is mapped through
-the stack by itself.
+sample costs a multiplication in V, and a few samples of a shell share three lattice lookups (`ray_stretch`).
+They need all that it moves to be read at one place (`ALONE` in `cagefield.edits.device.packing`); elsewhere
+each sample is mapped through the stack by itself.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.

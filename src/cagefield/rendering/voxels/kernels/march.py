@@ -14,7 +14,6 @@ from cagefield.compute.quadrants import qd
 from cagefield.edits.device.kernels.edit_maps import EditArgs
 from cagefield.rendering.voxels.kernels.edited_ray import (
     IN_PLACE,
-    LINE,
     EditedRay,
     edited_ray,
 )
@@ -119,15 +118,11 @@ def march_tiles(
                     ray.edit_in = through.x
                 ray.edit_out = through.y
                 stretch.until = ray.edit_in
-                seen = basis
                 while ray.t < ray.t_end and ray.T > MIN_LIGHT_LEFT:
                     if ray.t > stretch.until:
                         stretch = EditedRay(kind=IN_PLACE, until=1e30)
                         if ray.t <= ray.edit_out:
                             stretch = edited_ray(ray.t, camera.origin, d, edits)
-                        seen = basis
-                        if stretch.kind == LINE:
-                            seen = sh_basis(stretch.velocity / qd.max(stretch.velocity.norm(), 1e-20), K)
                     if stretch.kind == IN_PLACE:
                         march_stretch(
                             ray, stretch, basis,
@@ -135,7 +130,7 @@ def march_tiles(
                         )  # fmt: skip
                     else:
                         march_stretch(
-                            ray, stretch, seen,
+                            ray, stretch, basis,
                             march, grid, space, edits, K, contracted, edited, with_normals, True,
                         )  # fmt: skip
             at = 8 * (y * tiles.size.x + x)

@@ -1,8 +1,9 @@
 """The march through one stretch of a ray, by how its samples are mapped.
 
 Stretches end where a ray enters or leaves an edit (`edited_ray`). Samples that stay in place have a loop of
-their own, in which they cost what they cost in an unedited field. Empty space is leapt over without regard
-to stretches: the next begins at the first sample in an occupied block.
+their own, in which they cost what they cost in an unedited field. Samples in a lattice lie on arcs, each from
+three lookups. Empty space is leapt over without regard to stretches: the next begins at the first sample in
+an occupied block.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
@@ -13,7 +14,7 @@ from cagefield.compute.quadrants import qd
 from cagefield.edits.device.kernels.edit_maps import EditArgs, map_sample
 from cagefield.edits.device.kernels.grade import grade_sample
 from cagefield.edits.device.kernels.lattice import displacement
-from cagefield.rendering.voxels.kernels.edited_ray import LATTICE, LINE
+from cagefield.rendering.voxels.kernels.edited_ray import LATTICE, LINE, MIXED
 from cagefield.rendering.voxels.kernels.grid import (
     GridArgs,
     contract_velocity,
@@ -92,45 +93,54 @@ edit changes anything. T: share of the light that is left; depth: sum of w t; rg
 """
 
 
-LatticeSample = qd.types.struct(t=qd.f32, after=qd.f32, u=vec3, along=vec3)
-"""The displacement u in a lattice at t and its derivative; after: t of the sample that follows in turn."""
+MAX_ARC_STEPS = 10.0
+"""Length of an arc in a lattice at most, in steps; few rays take as many samples of a shell in a row, and an
+arc's end amid them is a branch that processors mispredict."""
+
+MAX_ARC_NODES = 6.0
+"""Length of an arc of several steps at most, in nodes of its lattice."""
+
+Arc = qd.types.struct(start=vec3, velocity=vec3, bow=vec3, middle=qd.f32, until=qd.f32, u=vec3)
+"""The curve start + t velocity + (t - middle)^2 bow in canonical space, of the samples up to t = until.
+
+In a lattice it is the parabola through the displacements at both ends and in the middle; u: that at its end.
+"""
 
 
 @qd.func
-def known_displacement(known: qd.template(), stretch: qd.template(), t: qd.f32, h: qd.f32, edits: EditArgs):
-    """(displacement, derivative along the ray) at t; h is the distance to the sample that follows.
+def next_arc(
+    arc: qd.template(), stretch: qd.template(), t: qd.f32, h: qd.f32, ray: qd.template(), edits: EditArgs
+):
+    """The arc of a stretch in a lattice on which the sample at t lies, and those that follow every h.
 
-    Of samples that follow each other, no more than a node apart, every second one is looked up, and the one
-    between has the cubic Hermite interpolant of its neighbors; `known` is the last one looked up.
+    It begins where the one before ends, or at t if empty space lies between.
     """
-    u = known.u
-    along = known.along
-    if t != known.t:
-        is_near = h * qd.abs(stretch.velocity).max() <= 1.0
-        is_between = is_near and t == known.after and t + h <= stretch.until
-        at = t
-        if is_between:
-            at = t + h
-        u, along = displacement(
-            stretch.start + at * stretch.velocity,
-            stretch.velocity,
-            edits.lattice,
-            stretch.first,
-            stretch.resolution,
-        )
-        u1 = u
-        along1 = along
-        if is_between:
-            length = at - known.t
-            rise = (u1 - known.u) / length
-            along = 1.5 * rise - 0.25 * (known.along + along1)
-            u = 0.5 * (known.u + u1) + (0.125 * length) * (known.along - along1)
-            u += (t - 0.5 * (known.t + at)) * along
-        known.t = at
-        known.u = u1
-        known.along = along1
-    known.after = t + h
-    return u, along
+    begin = arc.until
+    u0 = arc.u
+    if t > begin + 1.01 * h:
+        begin = t
+        u0 = displacement_at(begin, stretch, edits)
+    steps = qd.floor(MAX_ARC_NODES / (h * qd.abs(stretch.velocity).max()))
+    end = begin + qd.max(qd.min(steps, MAX_ARC_STEPS), 1.0) * h
+    end = qd.max(qd.min(end, stretch.until), t + 0.5 * h)
+    arc.middle = 0.5 * (begin + end)
+    length = end - begin
+    u = displacement_at(arc.middle, stretch, edits)
+    u1 = displacement_at(end, stretch, edits)
+    rise = (u1 - u0) / length
+    arc.bow = (2.0 * (u0 + u1) - 4.0 * u) / (length * length)
+    arc.start = ray.origin + u - arc.middle * rise
+    arc.velocity = ray.d + rise
+    arc.until = end
+    arc.u = u1
+
+
+@qd.func
+def displacement_at(t: qd.f32, stretch: qd.template(), edits: EditArgs):
+    """The displacement at t of a stretch in a lattice."""
+    at = stretch.start + t * stretch.velocity
+    u, _along = displacement(at, stretch.velocity, edits.lattice, stretch.first, stretch.resolution)
+    return u
 
 
 @qd.func
@@ -150,11 +160,16 @@ def march_stretch(
 ):
     """Adds the samples of an `EditedRay` to a `MarchedRay`, from its t on, which becomes that after the last.
 
-    `is_mapped`: False where they are IN_PLACE. `basis`: the harmonics of d, or of the direction that a LINE
-    has in canonical space.
+    `is_mapped`: False where they are IN_PLACE. `basis`: the harmonics of d.
     """
     segment = MapSegment(end=-1e30)
-    known = LatticeSample(t=-1e30, after=-1e30)
+    arc = Arc(start=stretch.start, velocity=stretch.velocity, until=1e30)
+    straight = basis
+    if qd.static(is_mapped):
+        if stretch.kind == LATTICE:
+            arc.until = -1e30
+        elif stretch.kind == LINE:
+            straight = sh_basis(arc.velocity / qd.max(arc.velocity.norm(), 1e-20), K)
     is_in = 1
     while is_in == 1 and ray.t < ray.t_end and ray.T > MIN_LIGHT_LEFT:
         t = ray.t
@@ -173,20 +188,19 @@ def march_stretch(
             moved = 0
             view = ray.d
             if qd.static(is_mapped):
-                moved = 1
-                if stretch.kind == LATTICE:
-                    u, along = known_displacement(known, stretch, t, h, edits)
-                    g = to_grid(ray.origin + t * ray.d + u, grid, contracted)
-                    view = ray.d + along
-                elif stretch.kind == LINE:
-                    g = to_grid(stretch.start + t * stretch.velocity, grid, contracted)
-                    view = stretch.velocity
-                else:
+                if stretch.kind == MIXED:
                     canonical, view, place, moved = map_in_segments(
                         segment, stretch, t, h, ray.origin, ray.d, edits, edited % 2 == 0
                     )
                     if moved == 1:
                         g = to_grid(canonical, grid, contracted)
+                else:
+                    moved = 1
+                    if t > arc.until + 0.01 * h:
+                        next_arc(arc, stretch, t, h, ray, edits)
+                    x = t - arc.middle
+                    g = to_grid(arc.start + t * arc.velocity + x * x * arc.bow, grid, contracted)
+                    view = arc.velocity + (2.0 * x) * arc.bow
             # The last bricks reach beyond the grid, and an edit may map samples there.
             if g.min() < 0.0 or (g - qd.cast(grid.resolution - 1, qd.f32)).max() > 0.0:
                 place = -1
@@ -214,7 +228,7 @@ def march_stretch(
                     w = ray.T * (1.0 - keep)
                     ray.T *= keep
                     if w > MIN_WEIGHT:
-                        seen = basis
+                        seen = straight
                         if qd.static(is_mapped):
                             if moved == 1 and stretch.kind != LINE:
                                 seen = sh_basis(view / qd.max(view.norm(), 1e-20), K)
