@@ -74,9 +74,9 @@ def test_the_seed_decides(dataset, trained):
 def test_a_gpu_with_a_ray_per_lane_learns_the_same(dataset, monkeypatch):
     """As far as a CPU can tell: its threads take the rays as a GPU's lanes do, and add up with atomics.
 
-    Without smoothing, which is of what the first of a CPU's accumulators has met, and a GPU has one. Threads add
-    in any order, and Adam makes a whole step of a gradient that is hardly more than rounding: a few vertices may
-    differ.
+    Without smoothing, which is of what the first of a CPU's accumulators has met, and a GPU has one. Threads
+    add in any order, and Adam makes a whole step of a gradient hardly above rounding: a few vertices
+    may differ.
     """
     few = replace(CONFIG, steps=20, laplacian_reg=0.0)
     expected = train_voxel(dataset, few, evaluate=False).field
