@@ -46,7 +46,7 @@ DRAGS, DRAG_SECONDS, DRAG_PX = 3, 1.5, 40
 PATIENCE = 300.0
 
 PREPARATION = (
-    "import sys; from cagefield.cli.light_preparation import prepare_light; prepare_light(sys.argv[1])"
+    "import sys; from cagefield.cli.edit_preparation import prepare_edits; prepare_edits(sys.argv[1])"
 )
 """Program that does what the commands that make scenes do last."""
 

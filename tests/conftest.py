@@ -18,7 +18,7 @@ import pytest
 
 import editor_page
 from cagefield import Scene, load_dataset
-from cagefield.cli import light_preparation
+from cagefield.cli import edit_preparation
 from cagefield.procedural import make_scene
 from cagefield.training.voxels.train_voxels import train_voxel
 from cagefield.training.voxels.voxel_config import VoxelConfig
@@ -58,7 +58,7 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ.setdefault("CAGEFIELD_DEVICE", "cpu")
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    light_preparation.MAX_SECONDS = 0.0  # tests of commands need no light
+    edit_preparation.MAX_SECONDS = 0.0  # tests of commands need no light
     if config.getoption("--page-renderer"):
         editor_page.DRAWN_BY = "page"
     config.add_cleanup(close_chromium)

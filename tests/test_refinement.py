@@ -22,12 +22,14 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.geometry.cage import Cage
 from cagefield.images.render_result import RenderResult
 from cagefield.scene.scene import Scene
-from cagefield.server.render_worker import edited_renderers
+from cagefield.server.render_worker import edited_renderers, renderer_cache
 from cagefield.server.render_worker.cancellation import GivenUpError
 from cagefield.server.render_worker.edited_renderers import attained_refinement
 from cagefield.server.render_worker.refinement import FINAL, Refinement
 from cagefield.server.render_worker.renderer_cache import RendererCache
-from cagefield.server.render_worker.tasks import Shown, values_of
+from cagefield.server.render_worker.tasks import Shown, WarmStage, values_of
+from cagefield.warps.kernels import flow_forward
+from cagefield.warps.kernels.affine_regions import map_regions, put_rows
 from scenes import ball_field
 from splat_scenes import splat_scene
 from tiers import nightly_except
@@ -94,6 +96,26 @@ def test_a_draft_computes_no_patch(cache: RendererCache, name: str, monkeypatch:
     made = cache.renderer(Shown(values_of((EDITS[name],))), Refinement.DRAFT)
     assert made.refinement < FINAL
     assert np.isfinite(made.renderer.render(CAMERA, background="white").rgb).all()
+
+
+def test_maps_of_light_are_compiled_before_the_first_edit_needs_them(
+    cache: RendererCache, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(renderer_cache, "numba_kernel_folder", lambda: tmp_path)
+    kernels = [kernel.block for kernel in (flow_forward.march, map_regions, put_rows)]
+    for kernel in kernels:
+        kernel._reset_overloads()
+    for stage in WarmStage:
+        cache.warm(stage)
+    ready = [kernel.signatures for kernel in kernels]
+    assert all(ready)
+    for edit in (BENT, BENT.move_corner(7, (0.05, 0.0, 0.05))):
+        cache.renderer(Shown(values_of((edit,))), FINAL)
+    assert [kernel.signatures for kernel in kernels] == ready
+    for kernel in kernels:
+        kernel._reset_overloads()
+    cache.warm(WarmStage.BENT_CAGE)
+    assert not any(kernel.signatures for kernel in kernels), "cached kernels are loaded by their first edit"
 
 
 @pytest.mark.parametrize("name", nightly_except(EDITS, "continuous", "move"))

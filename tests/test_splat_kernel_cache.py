@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from cagefield.compute import numba_cache
+from cagefield.compute import kernel_cache
 from cagefield.files import user_cache
 
-PACKAGE = Path(numba_cache.__file__).parents[1]
+PACKAGE = Path(kernel_cache.__file__).parents[1]
 
 # `overlaps` is the kernel that compiles fastest.
 ASK = """
@@ -120,7 +120,7 @@ def test_a_change_of_a_module_that_kernels_import_changes_the_digest(
 
     def folder() -> Path | None:
         user_cache.source_digest.cache_clear()
-        return numba_cache._kernel_folder.__wrapped__()
+        return kernel_cache.numba_kernel_folder.__wrapped__()
 
     try:
         before = folder()

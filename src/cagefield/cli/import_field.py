@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import tyro
 
-from cagefield.cli.light_preparation import prepare_light
+from cagefield.cli.edit_preparation import prepare_edits
 from cagefield.cli.options import Axes, Baking, BakingOptions, Device, Flag, Output, Up
 from cagefield.errors import CagefieldError
 
@@ -72,7 +72,7 @@ class ImportField:
             scene, lines = self._field()
         scene.save(self.out, overwrite=self.overwrite)
         print(f"{lines}\nscene written to {self.out}", flush=True)
-        prepare_light(self.out)
+        prepare_edits(self.out)
 
     def _check_file(self) -> None:
         """Raises CagefieldError for a config, and for a folder without splats, naming a checkpoint in it."""

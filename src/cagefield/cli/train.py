@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from cagefield.cli.light_preparation import prepare_light
+from cagefield.cli.edit_preparation import prepare_edits
 from cagefield.cli.options import (
     BakingOptions,
     Device,
@@ -146,7 +146,7 @@ class Train:
             checkpoint.unlink(missing_ok=True)
         else:
             shutil.rmtree(checkpoint, ignore_errors=True)
-        prepare_light(self.out)
+        prepare_edits(self.out)
 
     def checkpoint(self) -> Path:
         """File of the interrupted training, or the folder of its blocks."""

@@ -56,6 +56,12 @@ def kernel_cache() -> Path | None:
     return folder
 
 
+@functools.cache
+def numba_kernel_folder() -> Path | None:
+    """Cache folder of all Numba kernels for the present source; None, with a warning, if unusable."""
+    return cache_folder(f"numba-{source_digest(b'cagefield.compute.numba_cache import', parents=True)}")
+
+
 def cache_folder(name: str, within: str = "") -> Path | None:
     """Cache folder `name` of compiled kernels, created with its subfolder `within`; None, with a warning, if
     unusable.

@@ -15,8 +15,7 @@ from typing import Any
 
 import numba
 
-from cagefield.compute.kernel_cache import cache_folder, warn_cache_unusable
-from cagefield.files.user_cache import source_digest
+from cagefield.compute.kernel_cache import numba_kernel_folder, warn_cache_unusable
 
 FAST: dict[str, Any] = {"fastmath": True, "error_model": "numpy", "cache": True}
 """Options of every kernel: without `error_model`, checks for division by zero keep loops from vectorizing."""
@@ -35,7 +34,7 @@ def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]
         kernel = numba.njit(**options)(function)
         # With NUMBA_DISABLE_JIT there is nothing to keep; inlined functions are compiled with their callers.
         if cache and "inline" not in options and hasattr(kernel, "enable_caching"):
-            folder = _kernel_folder()
+            folder = numba_kernel_folder()
             if folder is not None:
                 _keep(kernel, folder)
         return kernel
@@ -79,9 +78,3 @@ def _tell(folder: Path, error: Exception) -> None:
     if not _TOLD:
         warn_cache_unusable(folder.parent, error)
     _TOLD.append(error)
-
-
-@functools.cache
-def _kernel_folder() -> Path | None:
-    """Cache folder of all Numba kernels for the present source; None, with a warning, if unusable."""
-    return cache_folder(f"numba-{source_digest(b'cagefield.compute.numba_cache import', parents=True)}")

@@ -136,8 +136,8 @@ class _ForwardFlow:
         march(
             np.ascontiguousarray(points),
             table_along(self.flow, self.flow.knots),
-            not motion.confines.is_affine,
-            not motion.is_affine,
+            None if motion.confines.is_affine else True,
+            None if motion.is_affine else True,
             steps,
             followed,
             moved,

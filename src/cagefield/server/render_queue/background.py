@@ -78,7 +78,7 @@ class BackgroundWork:
         wanted = None if self._session.moving else self._session.detours_wanted()
         if wanted is not None:
             return self._detours(wanted, generation)
-        if self.warming:
+        if self.warming and self.warming[0].is_for_moving:
             return self._warm()
         needs_light = any(edit.relight != "none" for edit in self._session.drawn())
         if not self.light_known and (needs_light or expects_edits):
@@ -86,6 +86,8 @@ class BackgroundWork:
         unlit = self._unlit()
         if unlit:
             return self._light_around(unlit, generation)
+        if self.warming:
+            return self._warm()
         measured = self._unmeasured() if rested else None
         if measured is not None:
             return self._measure(*measured, generation)

@@ -13,6 +13,7 @@ import numpy as np
 
 from cagefield.cameras.camera import Camera
 from cagefield.completion.inpainting.support_inpainting import load_solvers
+from cagefield.compute.kernel_cache import numba_kernel_folder
 from cagefield.edits import Continuous, Copy, Edit, EditStack, Move
 from cagefield.errors import EditError
 from cagefield.fields.splat_field import SplatField
@@ -36,6 +37,7 @@ from cagefield.server.render_worker.tasks import (
 )
 from cagefield.server.render_worker.view import Display, Region
 from cagefield.typing import Array, Float32
+from cagefield.warps.forward import to_deformed
 
 if TYPE_CHECKING:
     from cagefield.rendering.renderers import InteractiveRenderer
@@ -119,6 +121,9 @@ class RendererCache:
         """Makes the kernels of one stage ready, on a small edit."""
         if stage is WarmStage.DELETION:
             load_solvers()
+        if not stage.is_for_moving:
+            _compile_forward_map(stage)
+            return
         if not self._is_sampled:
             _warm_splats(stage)
             return
@@ -261,6 +266,26 @@ class RendererCache:
 def _lattice_bytes(edit: Edit) -> int:
     """Bytes of the lattice of an edit, whether it has been made or not."""
     return 12 * (edit.kernel_lattice or 0) ** 3 if isinstance(edit, Continuous) else 0
+
+
+def _compile_forward_map(stage: WarmStage) -> None:
+    """Compiles the map to deformed space, which takes light and splats along: of boxes, or of bent cages.
+
+    Once on a machine, where kernels are cached: importing Numba takes a second that no drag should wait for.
+    """
+    folder = numba_kernel_folder()
+    note = None if folder is None else folder / f"{stage.value}.compiled"
+    if note is not None and note.exists():
+        return
+    inner = Cage.box((0.0, 0.0, 0.0), 1.0)
+    outer = inner.grown(1.0)
+    edit = Edit.continuous(inner, outer).translate((0.1, 0.0, 0.0))
+    if stage is WarmStage.BENT_CAGE:
+        edit = edit.move_corner(7, (0.1, 0.1, 0.1))
+    to_deformed(edit.warp, 0.5 * (inner.corners + outer.corners))  # the shell takes the most time to compile
+    if note is not None:
+        with suppress(OSError):
+            note.touch()
 
 
 def _warm_splats(stage: WarmStage) -> None:

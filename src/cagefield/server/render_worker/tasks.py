@@ -27,6 +27,13 @@ class WarmStage(Enum):
     PICTURE = "picture"
     EXACT_EDIT = "exact edit"
     DELETION = "deletion"
+    LIGHT = "light"
+    BENT_CAGE = "bent cage"
+
+    @property
+    def is_for_moving(self) -> bool:
+        """Whether a drag's pictures need it before they need light."""
+        return self not in (WarmStage.LIGHT, WarmStage.BENT_CAGE)
 
 
 @dataclass(frozen=True)

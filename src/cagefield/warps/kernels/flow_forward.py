@@ -46,7 +46,9 @@ _ROWS = 77
 def march(begin, end, points, exact, bent_outer, bent_inner, newton_steps, followed, moved, jacobian, lost):
     """Writes the ends [N,3] of the ways of points [N,3], d(end)/d(point) [N,3,3], and where lost [N].
 
-    `followed` is the largest residual of coordinates, in units of xi, before the last of a stage's steps.
+    bent_outer, bent_inner: True, or None where that cage is a parallelepiped: without the branches for bent
+    ones the kernel takes half as long to compile. followed: the largest residual of coordinates, in units of
+    xi, before the last of a stage's steps.
     """
     table = exact.astype(np.float32)
     s = np.zeros(_ROWS * 32, np.float32)
@@ -54,13 +56,13 @@ def march(begin, end, points, exact, bent_outer, bent_inner, newton_steps, follo
         first = block * 32
         count = min(32, len(points) - first)
         _begin(points, first, count, exact, s)
-        if bent_outer:
+        if bent_outer is not None:
             for l in range(POINTS_PER_BATCH):
                 for a in range(3):
                     s[_OUTER + U(32 * a) + l] = min(max(s[_Z + U(32 * a) + l], -f32(1.0)), f32(1.0))
             for _ in range(START_NEWTON_STEPS):
                 _follow(s, _OUTER, _Z, table, U(10))
-        if bent_inner:
+        if bent_inner is not None:
             _affine(s, _Z, _V, table, U(HEADER))
             for l in range(POINTS_PER_BATCH):
                 for a in range(3):
@@ -139,7 +141,7 @@ def _stage(s, share, table, moment, bent_outer, bent_inner, newton_steps):
         s[_X + i] = s[_Z + i] + share * s[_K + i]
     _affine(s, _X, _V, table, moment)
     # V holds the straightened coordinates of the inner cage until they are known.
-    if bent_inner:
+    if bent_inner is not None:
         for _ in range(newton_steps):
             _follow(s, _INNER, _V, table, moment + U(10))
         for l in range(POINTS_PER_BATCH):
@@ -161,7 +163,7 @@ def _stage(s, share, table, moment, bent_outer, bent_inner, newton_steps):
                 value = table[moment + a, b]
                 for l in range(POINTS_PER_BATCH):
                     s[_DXI + U(32) * (U(3) * a + b) + l] = value
-    if bent_outer:
+    if bent_outer is not None:
         for _ in range(newton_steps):
             _follow(s, _OUTER, _X, table, U(10))
         for l in range(POINTS_PER_BATCH):
@@ -181,7 +183,7 @@ def _stage(s, share, table, moment, bent_outer, bent_inner, newton_steps):
             value = table[moment + U(4) + a, b]
             for l in range(POINTS_PER_BATCH):
                 s[_G + U(32) * (U(3) * a + b) + l] = value
-    if bent_inner:
+    if bent_inner is not None:
         _add_bend(s, table, moment + U(20))
 
 

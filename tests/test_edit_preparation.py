@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cagefield import Scene
-from cagefield.cli import light_preparation
+from cagefield.cli import edit_preparation
 from cagefield.completion import patch_cache, patcher
 from cagefield.formats.splats.splat_files import write_splats
 from commands import printed
@@ -28,8 +28,8 @@ def splats(tmp_path: Path) -> Path:
 
 
 def test_an_opened_scene_finds_the_light_that_its_import_computed(splats, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(light_preparation, "MAX_SECONDS", 600.0)
-    assert "light ready" in printed(capsys, "import", splats, "-o", tmp_path / "scene")
+    monkeypatch.setattr(edit_preparation, "MAX_SECONDS", 600.0)
+    assert "kernels and light ready" in printed(capsys, "import", splats, "-o", tmp_path / "scene")
 
     def computed(*_arguments: object) -> None:
         raise AssertionError("the light was computed again")
@@ -40,7 +40,7 @@ def test_an_opened_scene_finds_the_light_that_its_import_computed(splats, tmp_pa
 
 
 def test_a_light_that_takes_too_long_is_left_to_the_editor(splats, patches, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(light_preparation, "MAX_SECONDS", 1e-9)
+    monkeypatch.setattr(edit_preparation, "MAX_SECONDS", 1e-9)
     assert "left to the editor" in printed(capsys, "import", splats, "-o", tmp_path / "scene")
     assert not list(patches.glob("*.npz"))
     assert len(Scene.open(tmp_path / "scene").field) == len(room(box=True))
@@ -50,7 +50,7 @@ def test_an_imported_scene_stays_where_its_light_fails(splats, tmp_path, capsys,
     def fails(*_arguments: object, **_options: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr(light_preparation, "MAX_SECONDS", 600.0)
+    monkeypatch.setattr(edit_preparation, "MAX_SECONDS", 600.0)
     monkeypatch.setattr(patcher.Patcher, "warm", fails)
     assert "left to the editor" in printed(capsys, "import", splats, "-o", tmp_path / "scene")
     assert (tmp_path / "scene" / "scene.json").is_file()
