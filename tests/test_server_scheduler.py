@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from cagefield.server.protocol.common import DrawnHere
-from cagefield.server.render_queue.damage import Differing, everywhere
+from cagefield.server.render_queue.damage import WHOLE, Differing, Rect, everywhere
 from cagefield.server.render_queue.moving_resolution import (
     MAX_MOVING_SECONDS,
     MOVING_SECONDS,
@@ -369,8 +369,9 @@ def test_while_a_drag_goes_on_pictures_are_quick_and_tiles_too() -> None:
     assert {tile.refinement for tile in tiles} == set(Refinement)
 
 
-def test_tiles_of_a_held_drag_cover_its_coarse_pictures() -> None:
-    bench = Bench(5e5, lambda page, one, another: (0.313, 0.427, 0.619, 0.773))
+@pytest.mark.parametrize("changed", [(0.313, 0.427, 0.619, 0.773), WHOLE])
+def test_tiles_of_a_held_drag_cover_its_coarse_pictures(changed: Rect) -> None:
+    bench = Bench(5e5, lambda page, one, another: changed if one != another else None)
     bench.open(1)
     bench.finish()
     bench.settle()

@@ -142,11 +142,23 @@ class Showing:
         return found
 
     def drawn(
-        self, view: object, revision: int, area: Rect, *, whole: bool, all_wanting: bool, exact: bool
+        self,
+        view: object,
+        revision: int,
+        area: Rect,
+        *,
+        whole: bool,
+        all_wanting: bool,
+        exact: bool,
+        moving: bool = False,
     ) -> None:
-        """A picture was drawn in an area: the `whole` one, `all_wanting` (the last part of it), or less."""
+        """A picture was drawn in an area: the `whole` one, `all_wanting` (the last part of it), or less.
+
+        `moving`: with as many pixels as the speed allowed.
+        """
         if whole:
-            self.view, self.base, self.exact, self.later, self.coarse = view, revision, exact, set(), None
+            self.view, self.base, self.exact, self.later = view, revision, exact, set()
+            self.coarse = WHOLE if moving else None
             self._differences = {}
             return
         if view != self.view or self.base is None:

@@ -180,6 +180,7 @@ class Scheduler:
                 whole=whole or (request.complete and page.whole and not request.moving),
                 all_wanting=request.complete,
                 exact=attained == FINAL and not request.moving,
+                moving=request.moving,
             )
 
     def sent(self, request: EditsRequest, attained: Refinement) -> None:
