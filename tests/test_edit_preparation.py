@@ -1,4 +1,4 @@
-"""Commands that make scenes leave the light of the field for the editor, in a limited time."""
+"""Commands that make scenes leave kernels of edits and the light of the field for the editor."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from cagefield import Scene
 from cagefield.cli import edit_preparation
 from cagefield.completion import patch_cache, patcher
 from cagefield.formats.splats.splat_files import write_splats
+from cagefield.server.render_worker.renderer_cache import RendererCache
+from cagefield.server.render_worker.tasks import WarmStage
 from commands import printed
 from splat_rooms import room
 
@@ -28,8 +30,11 @@ def splats(tmp_path: Path) -> Path:
 
 
 def test_an_opened_scene_finds_the_light_that_its_import_computed(splats, tmp_path, capsys, monkeypatch):
+    stages: list[WarmStage] = []
+    monkeypatch.setattr(RendererCache, "warm", lambda self, stage: stages.append(stage))
     monkeypatch.setattr(edit_preparation, "MAX_SECONDS", 600.0)
     assert "kernels and light ready" in printed(capsys, "import", splats, "-o", tmp_path / "scene")
+    assert stages == list(WarmStage)
 
     def computed(*_arguments: object) -> None:
         raise AssertionError("the light was computed again")
@@ -46,11 +51,15 @@ def test_a_light_that_takes_too_long_is_left_to_the_editor(splats, patches, tmp_
     assert len(Scene.open(tmp_path / "scene").field) == len(room(box=True))
 
 
-def test_an_imported_scene_stays_where_its_light_fails(splats, tmp_path, capsys, monkeypatch):
+@pytest.mark.parametrize("warmed", [RendererCache, patcher.Patcher])
+@pytest.mark.parametrize("error", [MemoryError, KeyboardInterrupt])
+def test_an_imported_scene_stays_where_its_preparation_fails(
+    warmed, error, splats, tmp_path, capsys, monkeypatch
+):
     def fails(*_arguments: object, **_options: object) -> None:
-        raise MemoryError
+        raise error
 
     monkeypatch.setattr(edit_preparation, "MAX_SECONDS", 600.0)
-    monkeypatch.setattr(patcher.Patcher, "warm", fails)
+    monkeypatch.setattr(warmed, "warm", fails)
     assert "left to the editor" in printed(capsys, "import", splats, "-o", tmp_path / "scene")
     assert (tmp_path / "scene" / "scene.json").is_file()
