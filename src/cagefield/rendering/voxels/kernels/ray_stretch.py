@@ -169,7 +169,7 @@ def march_stretch(
         if stretch.kind == LATTICE:
             arc.until = -1e30
         elif stretch.kind == LINE:
-            straight = sh_basis(arc.velocity / qd.max(arc.velocity.norm(), 1e-20), K)
+            straight = basis_along(arc.velocity, K)
     is_in = 1
     while is_in == 1 and ray.t < ray.t_end and ray.T > MIN_LIGHT_LEFT:
         t = ray.t
@@ -231,7 +231,7 @@ def march_stretch(
                         seen = straight
                         if qd.static(is_mapped):
                             if moved == 1 and stretch.kind != LINE:
-                                seen = sh_basis(view / qd.max(view.norm(), 1e-20), K)
+                                seen = basis_along(view, K)
                         c = gather_rgb(grid.sh, slots, b, seen, K)
                         c = qd.max(qd.min(c, 1.0), 0.0)
                         if qd.static(edited >= GRADED):
@@ -252,6 +252,12 @@ def march_stretch(
                                     )
                             ray.normal -= w * slope / qd.max(slope.norm(), 1e-12)
             ray.t += h
+
+
+@qd.func
+def basis_along(velocity: vec3, K: qd.template()):
+    """The harmonics of the direction of a velocity in canonical space."""
+    return sh_basis(velocity / qd.max(velocity.norm(), 1e-20), K)
 
 
 @qd.func
