@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cagefield.cli.edit_preparation import prepare_edits
 from cagefield.cli.options import Device, Flag, Output, check_folder, check_number, progress_bar, track
 from cagefield.files.safe_open import real_path
 
@@ -76,6 +77,7 @@ class Demo:
             ("photos/", "what the field was trained on"),
         ):
             print(f"  {self.out}/{name:24} {what}")
+        prepare_edits(self.out / "edited")
         self._offer()
 
     def _offer(self) -> None:
