@@ -334,6 +334,20 @@ def test_light_is_found_before_the_first_cage_while_there_is_time() -> None:
     assert light is not None and light.make(1) == LightTask(1, 1)
 
 
+def test_kernels_of_drags_are_prepared_before_light_and_those_of_light_after_it() -> None:
+    session = session_of(lambda: (MOVED,))
+    background = BackgroundWork(session, Any, lambda: None, lambda _: None)  # type: ignore[arg-type]
+    background._errors.put(MOVED, None)
+    tasks: list[WarmStage | type] = []
+    while (task := background.next(0)) is not None:
+        made = task.make(1)
+        tasks.append(made.stage if isinstance(made, WarmTask) else type(made))
+        task.done(Answered(1))
+    stages = list(WarmStage)
+    assert stages[-2:] == [WarmStage.LIGHT, WarmStage.BENT_CAGE]
+    assert tasks == [*stages[:-2], LightTask, LightTask, *stages[-2:]]
+
+
 def test_jobs_write_pictures_and_a_video_that_is_there_when_it_is_whole(
     renderers: RendererCache, tmp_path: Path
 ) -> None:
